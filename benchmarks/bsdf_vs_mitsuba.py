@@ -192,7 +192,7 @@ def compare(pairs: int = 10_000) -> list[Row]:
             rows += rough(mi, name, ours, theirs, pairs, densities=known, limit=OF_TABLES)
     for roughness in (0.3, 0.6, 1.0):
         principled = {"type": "principled", "base_color": color, "metallic": 1.0, "roughness": roughness}
-        ours = Principled((0.9, 0.5, 0.1), 1.0, roughness)
+        ours = Principled((0.9, 0.5, 0.1), 1.0, roughness, multiscatter=False)
         rows += rough(mi, f"principled metal {roughness}", ours, principled, pairs, masked=roughness)
     whole = {"roughness": 0.4, "metallic": 0.3, "anisotropic": 0.6, "flatness": 0.7, "sheen": 0.8}
     whole |= {"sheen_tint": 0.4, "clearcoat": 0.9, "clearcoat_gloss": 0.3}
@@ -221,10 +221,10 @@ def compare(pairs: int = 10_000) -> list[Row]:
             alphas = {"alpha_u": first**2, "alpha_v": (second or first) ** 2, "distribution": distribution}
             name = f"{distribution} {first}" + (f", {second}" if second else "")
             known = distribution == "ggx"
-            metallic = Conductor(eta, k, first, **shape)
+            metallic = Conductor(eta, k, first, multiscatter=False, **shape)
             conductor = {"type": "roughconductor", **metal, **alphas}
             rows += rough(mi, f"conductor {name}", metallic, conductor, pairs, densities=known)
-            clear = Dielectric(1.5, first, **shape)
+            clear = Dielectric(1.5, first, multiscatter=False, **shape)
             dielectric = {"type": "roughdielectric", **glass, **alphas}
             rows += rough(mi, f"dielectric {name}", clear, dielectric, pairs, densities=known)
     return rows

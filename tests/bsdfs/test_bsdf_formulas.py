@@ -231,7 +231,14 @@ def test_facets_of_a_metal(distribution, along, across, degrees, shadowing):
     lo, li = masking(o), masking(i)
     g = 1 / (1 + lo + li) if shadowing == "correlated" else 1 / (1 + lo) / (1 + li)
     metal = Conductor(
-        1e-6, 1e4, along, roughness_v=across, rotation=degrees, distribution=distribution, shadowing=shadowing
+        1e-6,
+        1e4,
+        along,
+        roughness_v=across,
+        rotation=degrees,
+        distribution=distribution,
+        shadowing=shadowing,
+        multiscatter=False,
     )
     n = wo.shape[1]
     zero, up, lane = np.zeros(n, F4), np.repeat(F4([[0], [0], [1]]), n, 1), np.zeros(n, np.intp)
@@ -287,7 +294,7 @@ def test_boundary_of_rough_plastic(distribution):
         mu = k / 63
         u = np.random.default_rng(0).random((3, 200_000), dtype=F4)
         wo = np.repeat(np.array([[np.sqrt(1 - mu * mu)], [0], [mu]], F4), u.shape[1], 1)
-        sample = Dielectric(1.5, 0.5, distribution=distribution).sample_f(wo, u)
+        sample = Dielectric(1.5, 0.5, distribution=distribution, multiscatter=False).sample_f(wo, u)
         through = np.where(sample.wi[2] < 0, sample.weight[0] * sample.eta**2, 0)
         assert from_outside[0, k] == pytest.approx(through.mean(dtype=float), abs=4e-3)
     assert 0.4 < inside[0] < inner_reflectance(1.5)
@@ -346,13 +353,15 @@ def test_rough_metal(roughness):
     inner = np.sqrt(index**2 - (1 - cos**2))
     s, p = (cos - inner) / (cos + inner), (index**2 * cos - inner) / (index**2 * cos + inner)
     exact = value * (np.abs(s) ** 2 + np.abs(p) ** 2) / 2
-    assert Conductor(0.5, 3, roughness).f(wo, wi)[1] == pytest.approx(exact, rel=5e-4, abs=1e-6)
+    assert Conductor(0.5, 3, roughness, multiscatter=False).f(wo, wi)[1] == pytest.approx(
+        exact, rel=5e-4, abs=1e-6
+    )
 
 
 @pytest.mark.parametrize("back_facing", [False, True])
 @pytest.mark.parametrize("roughness", [0.3, 0.6, 1.0])
 def test_rough_glass(roughness, back_facing):
-    glass = Dielectric(1.5, roughness, reflectance=COLOR, transmittance=COLOR[::-1])
+    glass = Dielectric(1.5, roughness, reflectance=COLOR, transmittance=COLOR[::-1], multiscatter=False)
     eta = 1 / 1.5 if back_facing else 1.5
     glass.eta = np.array([eta], F4)
     wo, wi = pairs()
@@ -369,7 +378,7 @@ def test_rough_glass(roughness, back_facing):
 
 @pytest.mark.parametrize("roughness", [0.3, 1.0])
 def test_rough_sheet(roughness):
-    sheet = ThinDielectric(1.5, roughness, reflectance=COLOR, transmittance=COLOR[::-1])
+    sheet = ThinDielectric(1.5, roughness, reflectance=COLOR, transmittance=COLOR[::-1], multiscatter=False)
     wo, wi = pairs()
     value, cos = reflection(wo, wi, roughness**2)
     face = fresnel(cos, 1.5)
@@ -490,7 +499,7 @@ def test_opaque_base_that_conserves_energy():
 def test_clear_base(thin):
     """KHR_materials_transmission and _volume, with Fresnel's equations."""
     clear, metallic, roughness = 0.7, 0.2, 0.6
-    bsdf = Principled(COLOR, metallic, roughness, 1.5, clear, thin=thin, specular=0.0)
+    bsdf = Principled(COLOR, metallic, roughness, 1.5, clear, thin=thin, specular=0.0, multiscatter=False)
     wo, wi = pairs()
     value, cos = reflection(wo, wi, roughness**2)
     face = fresnel(cos, 1.5)
@@ -539,7 +548,7 @@ def test_shares_of_the_lobes(color, sheen, roughness):
     metallic, clear, specular, ior, tint, coat = 0.3, 0.4, 0.8, 1.7, (0.5, 0.5, 0.5), 0.6
     bsdf = Principled(
         color, metallic, roughness, ior, clear, thin=True, specular=specular, specular_color=tint,
-        clearcoat=coat, clearcoat_roughness=0.3, sheen=sheen, sheen_color=tint,
+        clearcoat=coat, clearcoat_roughness=0.3, sheen=sheen, sheen_color=tint, multiscatter=False,
     )  # fmt: skip
     wo, wi = pairs()
 

@@ -47,6 +47,7 @@ facets = {
     "rotation": st.floats(0, 360),
     "distribution": st.sampled_from(["ggx", "beckmann"]),
     "shadowing": st.sampled_from(["correlated", "separable"]),
+    "multiscatter": st.booleans(),
 }
 
 
@@ -172,9 +173,19 @@ def normal_inverse(wo: np.ndarray, m: np.ndarray, facets: Facets) -> np.ndarray:
     return np.stack([turn, 1 - (cap[2] + squeezed[2]) / (1 + squeezed[2])])
 
 
+def unstretched_inverse(w: np.ndarray, facets: Facets) -> np.ndarray:
+    """The u (2, 1) of a cosine-weighted direction that `unstretched` maps to w (3, 1), on any side."""
+    across = facets.alpha if facets.alpha_v is None else facets.alpha_v
+    cos, sin = (1.0, 0.0) if facets.tangent is None else facets.tangent[:, 0].astype(float)
+    turn = np.array([[cos, sin, 0], [-sin, cos, 0], [0, 0, 1]])
+    wide = turn @ w * columns(float(np.ravel(facets.alpha)[0]), float(np.ravel(across)[0]), 1)
+    return cosine_hemisphere_inverse(wide / np.linalg.norm(wide))
+
+
 def preimages(bsdf: Bsdf, wo: np.ndarray, wi: np.ndarray, inside: bool) -> list[np.ndarray]:
     """All u (2, 1) that may be mapped to wi, without repeats."""
     found = [cosine_hemisphere_inverse(wi)]
+    found += [unstretched_inverse(wi, facets) for facets in facets_of(bound_to(bsdf, wo, inside))]
     halves = [wo + wi, wo + wi * columns(1, 1, -1)]
     halves += [wo + eta * wi for eta in indices_of(bsdf, inside)]
     for half in halves:

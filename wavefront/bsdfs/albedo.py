@@ -7,7 +7,7 @@ from functools import cache
 
 import numpy as np
 
-from ..arrays.vec import Floats, dot, f4
+from ..arrays.vec import Bools, Floats, Ints, dot, f4
 from .microfacet import Facets, alpha_of, reflect
 
 SIZE = 32  # rows of roughness in [0, 1], and columns of the square root of the cosine in [0, 1]
@@ -16,14 +16,24 @@ SIDE = 32  # a direction's integral takes SIDE² samples
 
 def lookup(table: Floats, roughness: Floats, cos: Floats) -> Floats:
     """Bilinear value of a table (SIZE, SIZE) at roughness and cosine (n,), (n,)."""
-    y = np.clip(roughness, f4(0), f4(1)) * f4(SIZE - 1)
-    x = np.sqrt(np.clip(cos, f4(0), f4(1))) * f4(SIZE - 1)
-    j, i = np.minimum(y.astype(np.intp), SIZE - 2), np.minimum(x.astype(np.intp), SIZE - 2)
-    y, x = y - j.astype(f4), x - i.astype(f4)
-    corner = j * SIZE + i
+    return interpolate(table[None], roughness, np.sqrt(np.clip(cos, f4(0), f4(1))))
+
+
+def interpolate(table: Floats, y: Floats | None, x: Floats, side: Bools | Ints | int = 0) -> Floats:
+    """Bilinear value of a table (sides, rows, columns) at y and x in [0, 1], (n,); one row needs no y."""
+    _, rows, columns = table.shape
     flat = table.ravel()
+    x = np.clip(x, f4(0), f4(1)) * f4(columns - 1)
+    i = np.minimum(x.astype(np.intp), columns - 2)
+    x = x - i.astype(f4)
+    corner = i + side * (rows * columns)
+    if y is None:
+        return flat.take(corner) * (f4(1) - x) + flat.take(corner + 1) * x
+    y = np.clip(y, f4(0), f4(1)) * f4(rows - 1)
+    j = np.minimum(y.astype(np.intp), rows - 2)
+    y, corner = y - j.astype(f4), corner + j * columns
     low = flat.take(corner) * (f4(1) - x) + flat.take(corner + 1) * x
-    high = flat.take(corner + SIZE) * (f4(1) - x) + flat.take(corner + SIZE + 1) * x
+    high = flat.take(corner + columns) * (f4(1) - x) + flat.take(corner + columns + 1) * x
     return low * (f4(1) - y) + high * y
 
 

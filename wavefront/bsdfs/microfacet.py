@@ -54,6 +54,17 @@ class Facets(NamedTuple):
         cos, sin = self.tangent
         return np.stack([cos * w[0] + sin * w[1], cos * w[1] - sin * w[0], w[2]])
 
+    def _turned_back(self, w: Floats) -> Floats:
+        """Return directions (3, n) with x along the tangent in the frame of the surface."""
+        if self.tangent is None:
+            return w
+        cos, sin = self.tangent
+        return np.stack([cos * w[0] - sin * w[1], sin * w[0] + cos * w[1], w[2]])
+
+    def _scale(self) -> Floats:
+        """Return α along and across the tangent, (1 or 2, n)."""
+        return self.alpha if self.alpha_v is None else np.stack(np.broadcast_arrays(self.alpha, self.alpha_v))
+
     def stretched(self, w: Floats) -> Floats:
         """Return GGX's σ of directions (3, n), (n,)."""
         if self.alpha_v is None:
@@ -72,6 +83,33 @@ class Facets(NamedTuple):
         x, y, _ = self._turned(h)
         ratio = self.alpha_v / self.alpha
         return self.alpha * self.alpha_v, x * x * ratio + y * y / ratio
+
+    def turn(self, w: Floats) -> Floats | None:
+        """Return cos² of the azimuth of directions w (3, n) from the tangent, if it counts, (n,)."""
+        if self.alpha_v is None:
+            return None
+        x, y, _ = self._turned(w)
+        return x * x / np.maximum(x * x + y * y, TINY)
+
+    def stretched_turn(self, w: Floats) -> Floats | None:
+        """Return cos² of the azimuth of stretched directions w (3, n), if it counts, (n,)."""
+        if self.alpha_v is None:
+            return None
+        x, y, _ = self._turned(w)
+        along, across = (x * self.alpha) ** 2, (y * self.alpha_v) ** 2
+        return along / np.maximum(along + across, TINY)
+
+    def unstretched(self, w: Floats) -> Floats:
+        """Return the directions (3, n) whose stretched directions are w, with x along the tangent."""
+        wide = w.copy()
+        wide[:2] /= self._scale()
+        return normalize(self._turned_back(wide))
+
+    def wide_pdf(self, w: Floats) -> Floats:
+        """Density of directions w (3, n), (n,): half cosine-weighted ones, half the same `unstretched`."""
+        squared = self.stretched(w) ** 2
+        area = self.alpha * (self.alpha if self.alpha_v is None else self.alpha_v)
+        return np.abs(w[2]) * f4(0.5) * INV_PI * (f4(1) + area / (squared * squared))
 
     def normal_density(self, h: Floats, h2: Floats) -> Floats:
         """GGX's D(h/|h|) of half vectors h (3, n) of squared length h2 (n,), 1/sr (Walter et al., eq. 33)."""
@@ -108,9 +146,7 @@ class Facets(NamedTuple):
         Their density is D(m)·G1(wo)·(wo·m)/zo, of GGX. Source: J. Dupuy and A. Benyoub 2023, "Sampling
         Visible GGX Normals with Spherical Caps", Computer Graphics Forum 42(8), listing 3.
         """
-        scale = (
-            self.alpha if self.alpha_v is None else np.stack(np.broadcast_arrays(self.alpha, self.alpha_v))
-        )
+        scale = self._scale()
         squeezed = wo.copy() if self.tangent is None else self._turned(wo)
         squeezed[:2] *= scale
         squeezed = normalize(squeezed)
@@ -122,17 +158,20 @@ class Facets(NamedTuple):
         squeezed[2] += z
         squeezed[:2] *= scale
         squeezed[2] = np.maximum(squeezed[2], TINY)
-        if self.tangent is not None:
-            cos, sin = self.tangent
-            x, y = squeezed[0].copy(), squeezed[1].copy()
-            squeezed[0], squeezed[1] = cos * x - sin * y, sin * x + cos * y
-        return normalize(squeezed)
+        return normalize(self._turned_back(squeezed))
 
     def _smith(self, zo: Floats, zi: Floats, so: Floats, si: Floats) -> Floats:
         """G2/(4·zo·zi), (n,), of cosines and σ (n,) each."""
         if self.separable:
             return f4(1) / np.maximum((zo + so) * (zi + si), TINY)
         return f4(0.5) / np.maximum(zo * si + zi * so, TINY)
+
+    def weight(self, wo: Floats, wi: Floats, m: Floats) -> Floats:
+        """f·|cosθi|/pdf, without Fresnel, of wi (3, n) to which `visible_normals` m (3, n) lead, (n,)."""
+        zi = np.abs(wi[2])
+        stretched = self._beckmann_stretched if self.beckmann else self.stretched
+        so, si = stretched(wo), stretched(wi)
+        return f4(2) * zi * (wo[2] + so) * self._smith(wo[2], zi, so, si) * self.visible_weight(wo, m)
 
     def mirror_lobe(self, wo: Floats, wi: Floats) -> tuple[Floats, Floats, Floats]:
         """Reflection by the microfacets without Fresnel, where wi (3, n) is above the surface.

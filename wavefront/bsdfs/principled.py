@@ -9,7 +9,7 @@ from typing import Any, NamedTuple, Self
 import numpy as np
 
 from ..arrays.state import SurfaceInteraction
-from ..arrays.vec import INV_PI, Bools, Floats, broadcast, dot, f4, luminance
+from ..arrays.vec import INV_PI, TINY, Bools, Floats, broadcast, dot, f4, luminance
 from ..core.parameter import Parameter
 from ..core.suggestions import suggests_keywords
 from ..sampling.warp import cosine_hemisphere, cosine_hemisphere_pdf
@@ -18,6 +18,7 @@ from ..textures.parameter import Color, Scalar, color, refractive_index, scalar
 from .albedo import gloss_tables, lookup
 from .base import BsdfSample, weigh
 from .dielectric import LEAST_BEND
+from .energy import Loss, gain, loss, mean_over_cosines, part_kept
 from .fresnel import fresnel_dielectric
 from .microfacet import Facets, alpha_of, reflect, refract
 from .rough import RoughBsdf
@@ -33,6 +34,7 @@ class Chances(NamedTuple):
     gloss: Floats  # reflection in the surface's microfacets
     glass: Floats  # reflection or refraction in them, by Fresnel
     coat: Floats  # reflection in the clear coat
+    again: Floats  # what the microfacets of clear parts scatter more than once, on both sides
     diffuse: Floats  # cosine-weighted
 
 
@@ -78,7 +80,10 @@ class Principled(RoughBsdf):
         As for `Conductor`: a film below the clear coat (KHR_materials_iridescence).
     conserve_energy
         Layer the specular lobe over the diffuse base without a gain of energy. False follows glTF's appendix
-        exactly.
+        exactly, also without multiple scattering.
+    multiscatter
+        Return what the microfacets of metal and clear parts scatter more than once, as in `Conductor` and
+        `Dielectric`; not in clear parts that bend light with an index by texture or a film.
 
     Raises
     ------
@@ -130,10 +135,11 @@ class Principled(RoughBsdf):
         film_thickness: Scalar = 0.0,
         film_ior: Scalar = 1.3,
         conserve_energy: bool = True,
+        multiscatter: bool = True,
     ) -> None:
         self.base_color = base_color
         self.metallic = metallic
-        self._set_facets(roughness, roughness_v, rotation, "ggx", "correlated")
+        self._set_facets(roughness, roughness_v, rotation, "ggx", "correlated", multiscatter)
         self.ior = ior
         self.transmission = transmission
         self.thin = thin
@@ -150,11 +156,16 @@ class Principled(RoughBsdf):
 
     def derive(self) -> None:
         """Set which lobes exist."""
-        self._set_tangent()
+        self._set_shape()
         self.transmissive = _used(self.transmission)
         self._coated = _used(self.clearcoat)
         self._cloth = _used(self.sheen)
         self.has_film = has_film(self.film_thickness)
+        again = self.multiscatter and self.conserve_energy
+        self._metal_again = again and _used(self.metallic)
+        self._sheet_again = again and self.transmissive and self.thin
+        known = not (self.thin or self.has_film or isinstance(self.ior, BaseTexture))
+        self._clear_again = again and self.transmissive and known
 
     def bind(self, surface: SurfaceInteraction) -> Self:
         """Return the BSDF bound to `surface`, with the side of `wo`."""
@@ -167,9 +178,12 @@ class Principled(RoughBsdf):
     def albedo(self, wo: Floats) -> Floats:
         """Return about the albedo of all lobes, layered as in `evaluate`."""
         low, high, _, _ = gloss_tables()
-        at_f0, at_f90 = (lookup(table, self._mean_roughness(), wo[2]) for table in (low, high))
+        at_f0, at_f90 = (lookup(table, self.mean_roughness(), wo[2]) for table in (low, high))
         gloss = self._dielectric(np.zeros(1, f4)) * at_f0 + self.specular_weight * at_f90
         metal = self.base_color * at_f0 + at_f90
+        if self._metal_again:
+            lost = f4(1) - at_f0 - at_f90
+            metal = metal * (f4(1) + part_kept(self, self._mean_metal()) * lost / (f4(1) - lost))
         albedo = gloss + self.base_color * (f4(1) - gloss.max(0))
         if self.transmissive:
             reflected, _ = self._fresnel(wo[2])
@@ -199,7 +213,7 @@ class Principled(RoughBsdf):
 
     def sample_f(self, wo: Floats, u: Floats) -> BsdfSample:
         """Select a lobe by u[2], sample it, and weight by the density of all lobes."""
-        gloss, glass, coat, _ = self._chances(wo)
+        gloss, glass, coat, again, _ = self._chances(wo)
         facet = gloss + glass
         coated = (u[2] >= facet) & (u[2] < facet + coat)
         facets = self.facets()
@@ -217,6 +231,12 @@ class Principled(RoughBsdf):
             crosses = (u[2] >= gloss + glass * _chance(reflected)) & (u[2] < facet)
             index = self._eta()
             wi = np.where(crosses, self._across(wo, wi, m, cos, cos_refracted, index), wi)
+            if self._clear_again:
+                left = (u[2] - (facet + coat)) / np.maximum(again, TINY)
+                chosen = (left >= 0) & (left < 1)
+                numbers = np.stack([u[0], u[1], np.where(chosen, left, f4(0))])
+                wi = np.where(chosen, self._loss().directions(self, numbers, self._inside), wi)
+                crosses = np.where(chosen, wi[2] < 0, crosses)
             eta = np.where(crosses, index, f4(1))
         f, pdf = self.evaluate(wo, wi)
         pdf = np.where((wi[2] < 0) == crosses, pdf, f4(0))
@@ -229,9 +249,11 @@ class Principled(RoughBsdf):
         opaque = (f4(1) - self.metallic) * (f4(1) - self.transmission)
         weight = _fifth(cos)
         gloss = self._dielectric(weight)
-        metal = self.base_color + (f4(1) - self.base_color) * weight
+        metal = self._metal(cos)
+        if self._metal_again:
+            metal = metal * gain(self, wo, wi, self._mean_metal())
         if self.has_film:
-            metal, gloss = self._film(cos, self.base_color), self._gloss_with_film(cos)
+            gloss = self._gloss_with_film(cos)
         below = self._under_gloss(wo, wi) if self.conserve_energy else f4(1) - gloss.max(0)
         diffuse = opaque * below * np.where(wi[2] > 0, INV_PI, f4(0))
         f = (metal * self.metallic + gloss * opaque) * value + self.base_color * diffuse
@@ -241,8 +263,35 @@ class Principled(RoughBsdf):
         clear = (f4(1) - self.metallic) * self.transmission
         reflected, _ = self._fresnel(cos)
         through, through_density = self._through(wo, wi, facets)
-        f = f + (value * reflected * clear) + self.base_color * (through * clear)
-        return f, pdf + chances.glass * (density * _chance(reflected) + through_density)
+        pdf = pdf + chances.glass * (density * _chance(reflected) + through_density)
+        if self._sheet_again or self._clear_again:
+            grown = gain(self, wo, wi)
+            value, through = value * grown, through * grown if self.thin else through
+        once = value * reflected * clear + self.base_color * (through * clear)
+        if not self._clear_again:
+            return f + once, pdf
+        added, spread, _ = self._loss().lobe(self, wo, wi, self._inside)
+        tint = np.where(wi[2] < 0, self.base_color, f4(1))
+        return f + once + tint * (added * clear), pdf + chances.again * spread
+
+    def _metal(self, cos: Floats) -> Floats:
+        """Reflectance of the metal, (3, n), by Schlick's approximation or that of a film."""
+        if self.has_film:
+            return self._film(cos, self.base_color)
+        return self.base_color + (f4(1) - self.base_color) * _fifth(cos)
+
+    def _mean_metal(self) -> Floats:
+        """Mean of the reflectance of the metal over cosines, (3, n)."""
+        if self.has_film:
+            return mean_over_cosines(self._metal)
+        return self.base_color + (f4(1) - self.base_color) * f4(1 / 21)
+
+    @property
+    def _inside(self) -> Bools:
+        return np.zeros(1, np.bool_) if self.back_facing is None else self.back_facing
+
+    def _loss(self) -> Loss:
+        return loss(self.shape, float(_bent(self.ior)[0]))
 
     def _through(self, wo: Floats, wi: Floats, facets: Facets) -> tuple[Floats, Floats]:
         """Transmission with its Fresnel factor: value (n,), with a film (3, n), and density (n,)."""
@@ -287,8 +336,7 @@ class Principled(RoughBsdf):
         """Index beyond / before, (n,) or (1,); 1 for a sheet, and never quite 1 otherwise."""
         if self.thin:
             return np.ones(1, f4)
-        away = self.ior - f4(1)
-        bent = np.where(np.abs(away) < LEAST_BEND, f4(1 + LEAST_BEND), self.ior)
+        bent = _bent(self.ior)
         return bent if self.back_facing is None else np.where(self.back_facing, f4(1) / bent, bent)
 
     def _under_gloss(self, wo: Floats, wi: Floats) -> Floats:
@@ -303,16 +351,12 @@ class Principled(RoughBsdf):
         a, b, mean_a, mean_b = gloss_tables()
         f0 = self._dielectric(np.zeros(1, f4)).max(0)
         f90 = self.specular_weight
-        roughness = self._mean_roughness()
+        roughness = self.mean_roughness()
         passed = [
             f4(1) - f0 * lookup(first, roughness, cos) - f90 * lookup(second, roughness, cos)
             for first, second, cos in ((a, b, wo[2]), (a, b, np.abs(wi[2])), (mean_a, mean_b, wo[2]))
         ]
         return passed[0] * passed[1] / np.maximum(passed[2], f4(1e-3))
-
-    def _mean_roughness(self) -> Floats:
-        """Return a roughness whose gloss has about the albedo of this one."""
-        return self.roughness if self.roughness_v is None else np.sqrt(self.roughness * self.roughness_v)
 
     def _dielectric(self, weight: Floats) -> Floats:
         """Schlick's reflectance of the opaque dielectric, (3, n), at weight = (1 − cosθ)⁵."""
@@ -346,12 +390,16 @@ class Principled(RoughBsdf):
         glass = (f4(1) - self.metallic) * self.transmission
         if self._cloth:
             diffuse = diffuse + self.sheen * self.sheen_color.max(0) * (f4(0.2) + weight)
+        again = f4(0)
+        if self._clear_again:
+            again = glass * self._loss().at(self, wo, self._inside)
+            glass = glass - again
         coat = self.clearcoat * (floor + _schlick(COAT_F0, wo[2])) if self._coated else f4(0)
-        total = gloss + glass + coat + diffuse
+        total = gloss + glass + coat + again + diffuse
         share = f4(1) / np.where(total > 0, total, f4(1))
         full = np.broadcast_to
         shape = wo[2].shape
-        return Chances(*(full(part * share, shape) for part in (gloss, glass, coat, diffuse)))
+        return Chances(*(full(part * share, shape) for part in (gloss, glass, coat, again, diffuse)))
 
 
 def _chance(reflected: Floats) -> Floats:
@@ -362,6 +410,11 @@ def _chance(reflected: Floats) -> Floats:
 def _used(parameter: Any) -> bool:
     """Return whether a strength is above 0 anywhere."""
     return isinstance(parameter, BaseTexture) or bool((parameter > 0).any())
+
+
+def _bent(ior: Floats) -> Floats:
+    """Return an index that is at least `LEAST_BEND` away from 1."""
+    return np.where(np.abs(ior - f4(1)) < LEAST_BEND, f4(1 + LEAST_BEND), ior)
 
 
 def _fifth(cos: Floats) -> Floats:

@@ -30,9 +30,10 @@ class RefractiveBsdf(RoughBsdf):
         rotation: Scalar = 0.0,
         distribution: Distribution = "ggx",
         shadowing: Shadowing = "correlated",
+        multiscatter: bool = True,
     ) -> None:
         self.ior = ior
-        self._set_facets(roughness, roughness_v, rotation, distribution, shadowing)
+        self._set_facets(roughness, roughness_v, rotation, distribution, shadowing, multiscatter)
         self.reflectance = reflectance
         self.transmittance = transmittance
         self.derive()

@@ -15,6 +15,7 @@ from ..core.parameter import Parameter
 from ..textures.base import BaseTexture
 from ..textures.parameter import Scalar, scalar
 from .base import JointBsdf
+from .energy import Shape
 from .microfacet import Facets, alpha_of, is_smooth
 
 Distribution: TypeAlias = Literal["ggx", "beckmann"]
@@ -59,6 +60,7 @@ class RoughBsdf(JointBsdf):
     rotation = Parameter(partial(scalar, holds=np.isfinite, limit="finite"))
     distribution = Parameter(partial(one_of, choices=("ggx", "beckmann")))
     shadowing = Parameter(partial(one_of, choices=("correlated", "separable")))
+    multiscatter = Parameter(lambda _, value: bool(value))
     tangent: Any = None
 
     def _set_facets(
@@ -68,7 +70,9 @@ class RoughBsdf(JointBsdf):
         rotation: Scalar,
         distribution: Distribution,
         shadowing: Shadowing,
+        multiscatter: bool = False,
     ) -> None:
+        self.multiscatter = multiscatter
         self.roughness = roughness
         self.roughness_v = roughness_v
         self.rotation = rotation
@@ -79,10 +83,19 @@ class RoughBsdf(JointBsdf):
         """Set `specular` from the roughness, and what tells its direction."""
         across = self.roughness if self.roughness_v is None else self.roughness_v
         self.specular = is_smooth(self.roughness) and is_smooth(across)
-        self._set_tangent()
+        self._set_shape()
 
-    def _set_tangent(self) -> None:
+    def _set_shape(self) -> None:
+        """Set the tangent, and what tables of lost light depend on."""
         self.tangent = None if self.roughness_v is None else Tangent(self.rotation)
+        textures = isinstance(self.roughness, BaseTexture) or isinstance(self.roughness_v, BaseTexture)
+        known = [] if textures else [r for r in (self.roughness, self.roughness_v) if r is not None]
+        alpha, alpha_v, *_ = (*(float(alpha_of(r)[0]) for r in known), None, None)
+        self.shape = Shape(alpha, alpha_v, self.distribution == "beckmann", self.shadowing == "separable")
+
+    def mean_roughness(self) -> Floats:
+        """Return a roughness whose lobe has about the albedo of this one."""
+        return self.roughness if self.roughness_v is None else np.sqrt(self.roughness * self.roughness_v)
 
     def facets(self) -> Facets:
         """Return the microfacets; unbound, their tangent is the x axis."""

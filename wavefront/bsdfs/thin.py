@@ -6,6 +6,7 @@ import numpy as np
 
 from ..arrays.vec import Floats, dot, f4
 from .base import BsdfSample, weigh
+from .energy import gain
 from .fresnel import fresnel_dielectric
 from .microfacet import reflect
 from .mirror import mirrored
@@ -27,7 +28,7 @@ class ThinDielectric(RefractiveBsdf):
         In [0, 1]; α = roughness². Below α = 0.001 it is perfectly smooth.
     reflectance, transmittance
         Tints of the reflected and of the transmitted light per channel, in [0, 1].
-    roughness_v, rotation, distribution, shadowing
+    roughness_v, rotation, distribution, shadowing, multiscatter
         As for `Conductor`.
 
     Raises
@@ -53,6 +54,8 @@ class ThinDielectric(RefractiveBsdf):
         upper = wi.copy()
         upper[2] = np.abs(wi[2])
         value, density, cos = self.facets().mirror_lobe(wo, upper)
+        if self.multiscatter:
+            value = value * gain(self, wo, upper)
         reflected = self._reflected(cos)
         above = wi[2] > 0
         part = np.where(above, reflected, f4(1) - reflected)

@@ -191,6 +191,8 @@ def _facets(node: Node, job: Job) -> dict[str, Any]:
         "distribution": node.choice("distribution", "beckmann", ("beckmann", "ggx")),
         "shadowing": "separable",
     }
+    if "plastic" not in node.plugin:
+        facets["multiscatter"] = False
     return facets | ({"roughness_v": roughness(node, "alpha_v", 0.1, job)} if both else {})
 
 

@@ -100,7 +100,7 @@ def _layer(entity: Entity, job: Job) -> float:
 @converts("material", "conductor")
 def _conductor(entity: Entity, job: Job) -> Material:
     eta, k = _metal(entity, job, "")
-    return _made(entity, Conductor(eta, k, **_roughness(entity, job)), job)
+    return _made(entity, Conductor(eta, k, **_roughness(entity, job), multiscatter=False), job)
 
 
 @converts("material", "coatedconductor")
@@ -113,7 +113,9 @@ def _coated_conductor(entity: Entity, job: Job) -> Material:
     ior = float(np.mean(_index(entity, "interface.eta", job)))
     entity.lose("the light between its layers; a metal with a clearcoat in its place")
     base = computed(_reflectance, eta, k, ior, rising=False)
-    bsdf = Principled(base, 1.0, clearcoat=1.0, clearcoat_roughness=coat["roughness"], **metal)
+    bsdf = Principled(
+        base, 1.0, clearcoat=1.0, clearcoat_roughness=coat["roughness"], **metal, multiscatter=False
+    )
     return _made(entity, bsdf, job)
 
 
@@ -143,7 +145,9 @@ def _metal(entity: Entity, job: Job, prefix: str) -> tuple[Value, Value]:
 
 @converts("material", "dielectric")
 def _dielectric(entity: Entity, job: Job) -> Material:
-    return _made(entity, Dielectric(_index(entity, "eta", job), **_roughness(entity, job)), job)
+    return _made(
+        entity, Dielectric(_index(entity, "eta", job), **_roughness(entity, job), multiscatter=False), job
+    )
 
 
 @converts("material", "thindielectric")

@@ -1,0 +1,152 @@
+"""Light that microfacets scatter more than once: white furnaces, colors, what the tables hold."""
+
+import numpy as np
+import pytest
+from scipy import stats
+from test_bsdfs import Constant, surface
+
+from wavefront.bsdfs import Bsdf, Conductor, Dielectric, Principled, ThinDielectric
+from wavefront.bsdfs.energy import Shape, loss, mean_over_cosines, scaling
+from wavefront.bsdfs.rough import RoughBsdf
+
+F4 = np.float32
+SAMPLES = 10_000
+WITHIN = 0.01  # of all light
+ALPHA = 1e-4  # probability of a false alarm of one test
+
+
+def toward(mu: float, turn: float, n: int) -> np.ndarray:
+    """wo (3, n) of a cosine and an azimuth."""
+    r = np.sqrt(1 - mu * mu)
+    return np.repeat(np.array([[r * np.cos(turn)], [r * np.sin(turn)], [mu]], F4), n, 1)
+
+
+def energies(bsdf: Bsdf, wo: np.ndarray, inside: bool, rng: np.random.Generator) -> np.ndarray:
+    """The energy of samples per channel, (3, n)."""
+    n = wo.shape[1]
+    sample = bsdf.bind(surface(wo, inside)).sample_f(wo, rng.random((bsdf.dimensions, n), F4))
+    energy = sample.weight.astype(float)
+    return energy if sample.eta is None else energy * sample.eta.astype(float) ** 2
+
+
+WHITE = {
+    "metal": lambda rng, r: Conductor(1e-6, 1e4, r),
+    "metal of Beckmann": lambda rng, r: Conductor(1e-6, 1e4, r, distribution="beckmann"),
+    "metal with separable shadowing": lambda rng, r: Conductor(1e-6, 1e4, r, shadowing="separable"),
+    "brushed metal": lambda rng, r: Conductor(1e-6, 1e4, r, roughness_v=rng.uniform(0.2, 1), rotation=40.0),
+    "metal by texture": lambda rng, r: Conductor(1e-6, 1e4, Constant(r)),
+    "glass": lambda rng, r: Dielectric(rng.uniform(1.1, 2.4), r),
+    "bubble": lambda rng, r: Dielectric(1 / rng.uniform(1.1, 2.4), r),
+    "glass of Beckmann": lambda rng, r: Dielectric(1.5, r, distribution="beckmann"),
+    "almost air": lambda rng, r: Dielectric(rng.uniform(1.002, 1.1), max(r, 0.2)),
+    "brushed glass": lambda rng, r: Dielectric(1.5, r, roughness_v=max(0.2, r * rng.uniform(0.6, 1))),
+    "glass by texture": lambda rng, r: Dielectric(1.5, Constant(r)),
+    "sheet": lambda rng, r: ThinDielectric(rng.uniform(1.1, 2.4), r),
+    "principled metal": lambda rng, r: Principled(1.0, 1.0, r),
+    "principled gloss": lambda rng, r: Principled(1.0, 0.0, r),
+    "principled glass": lambda rng, r: Principled(1.0, 0.0, r, rng.uniform(1.1, 2.4), 1.0),
+    "principled sheet": lambda rng, r: Principled(1.0, 0.0, r, 1.5, 1.0, thin=True),
+    "all of principled": lambda rng, r: Principled(1.0, 0.3, r, 1.5, 0.5),
+}
+
+
+@pytest.mark.parametrize("name", WHITE)
+def test_a_white_surface_loses_nothing(name: str) -> None:
+    """At random roughnesses and angles; the deviation from 1 is more than 1 % with no significance."""
+    rng = np.random.default_rng(list(WHITE).index(name))
+    count = 12
+    limit = stats.norm.isf(1 - (1 - ALPHA) ** (1 / count))
+    for _ in range(count):
+        bsdf = WHITE[name](rng, rng.uniform(0.05, 1))
+        mu = np.cos(np.radians(rng.choice([rng.uniform(0, 80), rng.uniform(80, 89)])))
+        wo = toward(float(mu), rng.uniform(0, 2 * np.pi), SAMPLES)
+        energy = energies(bsdf, wo, bool(bsdf.transmissive and rng.random() < 0.5), rng)[1]
+        error = energy.std() / np.sqrt(SAMPLES)
+        assert error < 0.02
+        assert abs(energy.mean() - 1) < WITHIN + limit * error, (vars(bsdf), mu)
+
+
+def test_single_scattering_loses_light() -> None:
+    rng = np.random.default_rng(0)
+    wo = toward(1.0, 0.0, SAMPLES)
+    for bsdf in (Conductor(1e-6, 1e4, 1.0, multiscatter=False), Principled(1.0, 1, 1.0, multiscatter=False)):
+        assert energies(bsdf, wo, False, rng).mean() == pytest.approx(0.307, abs=0.02)
+
+
+def test_mean_over_cosines() -> None:
+    """Exact for polynomials up to the fifth degree."""
+    for k in range(6):
+        mean = mean_over_cosines(lambda mu, k=k: (mu.astype(float) ** k)[None])
+        assert mean == pytest.approx(2 / (k + 2), rel=1e-6)
+
+
+@pytest.mark.parametrize("f0", [0.3, 0.9])
+@pytest.mark.parametrize("roughness", [0.4, 1.0])
+def test_colors_deepen_with_each_reflection(f0: float, roughness: float) -> None:
+    """A metal of one reflectance F keeps F·M/(1 − F·(1 − M)) of what it scatters more than once."""
+    rng = np.random.default_rng(1)
+    table = scaling(Shape(roughness**2, None, False, False))
+    u = rng.random((2, SAMPLES), F4)
+    cosines, flat = np.sqrt(u[0]), np.full(SAMPLES, F4(1))
+    mu = np.stack([np.sqrt(1 - cosines**2), 0 * flat, cosines])
+    once = Conductor(1e-6, 1e4, roughness, multiscatter=False)
+    mean = energies(once, mu, False, rng)[0].mean()  # of light from all directions
+    assert table.albedo[0, 0] == pytest.approx(mean, abs=0.01)
+    metal = Principled(f0, 1.0, roughness)
+    single = Principled(f0, 1.0, roughness, multiscatter=False)
+    fresnel = f0 + (1 - f0) / 21
+    kept = fresnel * mean / (1 - fresnel * (1 - mean))
+    wo, wi = toward(0.8, 0.0, SAMPLES), toward(0.5, 1.0, SAMPLES)
+    white = Conductor(1e-6, 1e4, roughness).f(wo, wi) / once.f(wo, wi)
+    assert (metal.f(wo, wi) / single.f(wo, wi))[0, 0] == pytest.approx(1 + (white[0, 0] - 1) * kept, abs=0.01)
+
+
+def test_the_layer_albedo_of_a_metal_is_that_of_its_samples() -> None:
+    rng = np.random.default_rng(2)
+    for roughness in (0.5, 1.0):
+        metal = Principled((0.9, 0.5, 0.2), 1.0, roughness)
+        for mu in (1.0, 0.4):
+            wo = toward(mu, 0.0, 100_000)
+            assert metal.albedo(wo)[:, 0] == pytest.approx(energies(metal, wo, False, rng).mean(1), abs=0.02)
+
+
+def test_the_literal_material_of_gltf_has_none() -> None:
+    wo, wi = toward(0.8, 0.0, 1), toward(0.5, 1.0, 1)
+    literal = Principled(0.9, 1.0, 0.9, conserve_energy=False).f(wo, wi)
+    assert literal == pytest.approx(Principled(0.9, 1.0, 0.9, multiscatter=False).f(wo, wi), rel=1e-6)
+
+
+def test_dispersion_films_and_textures_of_the_index_are_without() -> None:
+    wo, wi = toward(0.8, 0.0, 100), toward(0.5, 1.0, 100)
+    for arguments in ({"ior": (1.5, 1.51, 1.53)}, {"film_thickness": 300.0}, {"ior": Constant(1.5)}):
+        with_it, without = (
+            Dielectric(**{"roughness": 0.8, **arguments}, multiscatter=on).bind(surface(wo)).f(wo, wi)
+            for on in (True, False)
+        )
+        np.testing.assert_array_equal(with_it, without)
+
+
+def test_surfaces_without_microfacets_need_no_table() -> None:
+    scaling.cache_clear()
+    loss.cache_clear()
+    wo = toward(0.8, 0.0, 10)
+    for bsdf in (Conductor(0.2, 3), Dielectric(1.5), ThinDielectric(1.5), Principled(0.5)):
+        bsdf.bind(surface(wo)).sample_f(wo, np.full((bsdf.dimensions, 10), 0.5, F4))
+    assert scaling.cache_info().currsize == loss.cache_info().currsize == 0
+
+
+@pytest.mark.parametrize("across", [None, 0.3])
+def test_tables_have_their_shape_by_the_roughness(across: float | None) -> None:
+    class Rough(RoughBsdf):
+        """A surface of microfacets without a model."""
+
+        def __init__(self, roughness):
+            self._set_facets(roughness, across, 0.0, "beckmann", "separable")
+            self.derive()
+
+        def evaluate(self, wo, wi):
+            raise NotImplementedError
+
+    alpha_v = None if across is None else pytest.approx(0.09)
+    assert Rough(0.5).shape == (pytest.approx(0.25), alpha_v, True, True)
+    assert Rough(Constant(0.5)).shape == (None, None, True, True)

@@ -1,0 +1,272 @@
+"""The light that microfacets scatter more than once, which models of single scattering lose.
+
+Metals and thin sheets: the lobe is multiplied by c(wo)·c(wi), with the c for which a surface that absorbs
+nothing reflects all light from every direction, c(wo)·∫ f·c(wi)·cosθi dωi = 1. So the lobe keeps its shape
+and its sampling, as in E. Turquin 2019, "Practical Multiple Scattering Compensation for Microfacet Models",
+whose factor 1/E(wo) is not reciprocal. Absorption deepens colors as in C. Kulla and A. Conty 2017,
+"Revisiting Physically Based Shading at Imageworks".
+
+Boundaries that refract: reflection is multiplied by the same c(wo)·c(wi), and what is still lost, L(w),
+returns as Kulla and Conty's lobe L(wo)·L(wi)/(π·mean L). As much of it crosses as the other side can return,
+times the mean transmittance: f·η² stays reciprocal.
+"""
+
+from __future__ import annotations
+
+from functools import cache
+from typing import TYPE_CHECKING, NamedTuple, TypeAlias
+
+import numpy as np
+
+from ..arrays.elementary import sin_cos_turns
+from ..arrays.vec import BELOW_ONE, INV_PI, Bools, Doubles, Floats, Ints, dot, f4
+from ..sampling.warp import cosine_hemisphere
+from .albedo import interpolate
+from .fresnel import fresnel_dielectric
+from .microfacet import Facets, alpha_of, reflect, refract
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from .rough import RoughBsdf
+
+COLUMNS = 32  # of a table, by the angle to the normal
+FINE = 1024  # of a table of one row, in the end
+ROUGHNESSES = 16  # rows of a table for textures: roughnesses in [0, 1]
+TURNS = np.linspace(0, 1, 6)  # rows of a table of two roughnesses: cos² of azimuths
+NORMALS = 256  # microfacets that each entry of a table sums over, and `NORMALS_OF_ONE` in a table of one row
+NORMALS_OF_ONE = 1024
+GOLDEN = 0.6180339887498949  # (√5 − 1)/2, whose multiples are spread evenly
+MIDPOINTS, AROUND = 512, 16  # of roots of cosines, and of azimuths, for means
+STEPS = 8  # to c, each of which halves the error or more
+LEAST = 1e-4  # part that is lost, so that the lobe has a value wherever it has samples
+# ∫ 2μ·g(μ) dμ by the quadrature of Gauss and Jacobi: nodes and weights
+MEAN = (
+    (0.2123405382391529, 0.13965395987677572),
+    (0.5905331355592653, 0.4584822127191725),
+    (0.9114120404872960, 0.4018638274079180),
+)
+
+Place: TypeAlias = tuple[Floats | None, Floats]  # row, in a table of two roughnesses, and column, in [0, 1]
+
+
+class Shape(NamedTuple):
+    """What tables depend on, beside an index of refraction."""
+
+    alpha: float | None  # None: all roughnesses, for textures
+    alpha_v: float | None
+    beckmann: bool
+    separable: bool
+
+
+class Scaling(NamedTuple):
+    """How reflection grows."""
+
+    factor: Floats  # (1, rows, columns) c
+    albedo: Floats  # (1, r) mean of what is scattered once, of each roughness
+
+
+class Loss(NamedTuple):
+    """The lobe of what a boundary that refracts loses; its sides are outside and inside."""
+
+    lost: Floats  # (2, rows, columns) L
+    means: Floats  # (2, r) of L, of each roughness, times the square of the index of the side
+    passed: float  # mean transmittance of a smooth boundary
+    ior: float
+
+    def at(self, bsdf: RoughBsdf, w: Floats, inside: Bools) -> Floats:
+        """Return L of directions w (3, n) on the inside or not, (n,)."""
+        return _directional(bsdf, self.lost, _place_of_refraction(bsdf.facets(), w), inside)
+
+    def lobe(self, bsdf: RoughBsdf, wo: Floats, wi: Floats, inside: Bools) -> tuple[Floats, Floats, Floats]:
+        """Return value and density, and the probability to sample it, (n,) each, for wo inside or not."""
+        below = wi[2] < 0
+        chance = self.at(bsdf, wo, inside)
+        here, beyond, crossing = self._sides(bsdf, inside)
+        part = np.where(below, crossing, f4(1) - crossing)
+        scale = INV_PI * np.where(inside, f4(self.ior * self.ior), f4(1)) / np.where(below, beyond, here)
+        value = chance * self.at(bsdf, wi, inside != below) * part * scale
+        return value, bsdf.facets().wide_pdf(wi) * part, chance
+
+    def directions(self, bsdf: RoughBsdf, u: Floats, inside: Bools) -> Floats:
+        """Return directions of the lobe (3, n) for u (3, n) and wo inside or not."""
+        second = u[2] >= 0.5
+        wi = cosine_hemisphere(u)
+        wi = np.where(second, bsdf.facets().unstretched(wi), wi)
+        wi[2] *= np.where(f4(2) * u[2] - second < self._sides(bsdf, inside)[2], f4(-1), f4(1))
+        return wi
+
+    def sample(self, bsdf: RoughBsdf, wo: Floats, u: Floats, inside: Bools) -> tuple[Bools, Floats, Floats]:
+        """Return where the lobe is chosen by u[2], its directions, and what is left of u[2]."""
+        chance = self.at(bsdf, wo, inside)
+        chosen = u[2] < chance
+        left = np.where(chosen, u[2], u[2] - chance) / np.where(chosen, chance, f4(1) - chance)
+        left = np.minimum(left, BELOW_ONE)
+        return chosen, self.directions(bsdf, np.stack([u[0], u[1], left]), inside), left
+
+    def _sides(self, bsdf: RoughBsdf, inside: Bools) -> tuple[Floats, Floats, Floats]:
+        """Return the means here and beyond, and the part of the lobe that is beyond the boundary."""
+        here, beyond = (_of_roughness(bsdf, self.means, side) for side in (inside, ~inside))
+        return here, beyond, f4(self.passed) * np.minimum(here, beyond) / here
+
+
+def mean_over_cosines(reflectance: Callable[[Floats], Floats]) -> Floats:
+    """Return the mean of a reflectance over diffuse light, ∫ 2μ·F(μ) dμ."""
+    first, *others = (reflectance(np.full(1, mu, f4)) * f4(weight) for mu, weight in MEAN)
+    return sum(others, first)
+
+
+def gain(bsdf: RoughBsdf, wo: Floats, wi: Floats, mean_reflectance: Floats | None = None) -> Floats:
+    """Return by how much reflection grows, (n,); of a metal with a mean reflectance (3, n)."""
+    table, facets = scaling(bsdf.shape).factor, bsdf.facets()
+    one, other = (_directional(bsdf, table, _place_of_masking(facets, w)) for w in (wo, wi))
+    if mean_reflectance is None:
+        return one * other
+    return f4(1) + (one * other - f4(1)) * part_kept(bsdf, mean_reflectance)
+
+
+def part_kept(bsdf: RoughBsdf, mean_reflectance: Floats) -> Floats:
+    """Return the part that a metal keeps of what it scatters more than once, beside the first F, (3, n).
+
+    It is F·M/(1 − F·(1 − M)), with M the mean albedo of single scattering (Kulla and Conty).
+    """
+    mean = _of_roughness(bsdf, scaling(bsdf.shape).albedo)
+    return mean_reflectance * mean / (f4(1) - mean_reflectance * (f4(1) - mean))
+
+
+def _place_of_masking(facets: Facets, w: Floats) -> Place:
+    """Return where directions w (3, n) are in `Scaling`: by the azimuth and cosine of stretched ones."""
+    return facets.stretched_turn(w), np.abs(w[2]) / facets.stretched(w)
+
+
+def _place_of_refraction(facets: Facets, w: Floats) -> Place:
+    """Return where directions w (3, n) are in `Loss`: masking follows stretched ones, refraction does not."""
+    z = np.abs(w[2])
+    return facets.turn(w), np.sqrt(np.minimum(f4(0.5) * (z + z / facets.stretched(w)), f4(1)))
+
+
+def _directional(bsdf: RoughBsdf, table: Floats, place: Place, side: Bools | int = 0) -> Floats:
+    """Return what a table (sides, rows, columns) has for directions at a place, (n,)."""
+    turn, column = place
+    if table.shape[1] == 1:
+        nearest = (column * f4(FINE - 1) + f4(0.5)).astype(np.intp)
+        return table.ravel().take(nearest + side * FINE)
+    return interpolate(table, bsdf.mean_roughness() if bsdf.shape.alpha is None else turn, column, side)
+
+
+def _of_roughness(bsdf: RoughBsdf, table: Floats, side: Bools | int = 0) -> Floats:
+    """Return what a table (sides, r) has for the roughness, (n,) or (1,)."""
+    if table.shape[1] == 1:
+        return table.ravel().take(np.atleast_1d(side).astype(np.intp))
+    return interpolate(table[:, None], None, bsdf.mean_roughness(), side)
+
+
+@cache
+def scaling(shape: Shape) -> Scaling:
+    """Return the table of surfaces that reflect, or let pass without bending."""
+    x = np.linspace(0, 1, COLUMNS)
+    kernels, turns = [], len(_rows(shape)) if shape.alpha_v else 1
+    for facets, alpha, across, turn in _rows(shape):
+        turned = turn * across**2 / (turn * across**2 + (1 - turn) * alpha**2)
+        toward = np.sqrt(turned * alpha**2 + (1 - turned) * across**2) * x
+        wo, m = _visible(facets, turned, toward / np.sqrt(toward**2 + 1 - x * x), shape)
+        wi = reflect(wo, m)
+        weight = np.where(wi[2] > 0, facets.weight(wo, wi, m), f4(0)).astype(float)
+        row, column = _place_of_masking(facets, wi)
+        corners = _neighbors(column, COLUMNS)
+        if row is not None:
+            corners = [(j * COLUMNS + i, y * x) for j, y in _neighbors(row, turns) for i, x in corners]
+        total = turns * COLUMNS
+        start = np.arange(COLUMNS).repeat(weight.size // COLUMNS) * total
+        parts = [np.bincount(start + i, weight * part, COLUMNS * total) for i, part in corners]
+        kernels.append(sum(parts[1:], parts[0]).reshape(COLUMNS, total) * (COLUMNS / weight.size))
+    kernel = np.array(kernels).reshape(-1, turns * COLUMNS, turns * COLUMNS)  # roughnesses do not mix
+    factor = np.ones(kernel.shape[:2])
+    for _ in range(STEPS):
+        factor = np.sqrt(factor / (kernel * factor[:, None]).sum(2))
+    once = kernel.sum(2).reshape(1, -1, COLUMNS)
+    albedo = _means(shape, once, _place_of_masking)
+    return Scaling(_fine(factor.reshape(once.shape)), albedo.astype(np.float32))
+
+
+@cache
+def loss(shape: Shape, ior: float) -> Loss:
+    """Return the table of a boundary of an index of refraction, inside relative to outside."""
+    factor, rows = scaling(shape).factor, _rows(shape)
+    cos, places = np.linspace(0, 1, 2048) ** 2, np.linspace(0, 1, COLUMNS)
+    lost = np.empty((2, len(rows), COLUMNS))
+    for k, (facets, alpha, across, turn) in enumerate(rows):
+        toward2 = turn * alpha**2 + (1 - turn) * across**2
+        known = np.sqrt(0.5 * cos * (1 + 1 / np.sqrt(cos**2 + toward2 * (1 - cos**2))))
+        wo, m = _visible(facets, turn, np.interp(places, known, cos), shape)
+        seen, wi = np.maximum(dot(wo, m), f4(0)), reflect(wo, m)
+        table = factor[:, k : k + 1] if shape.alpha is None else factor
+        one, other = (interpolate(table, *_place_of_masking(facets, w)) for w in (wo, wi))
+        above = np.where(wi[2] > 0, facets.weight(wo, wi, m) * one * other, f4(0))
+        for side, eta in enumerate((ior, 1 / ior)):
+            index = np.full(1, eta, f4)
+            reflected, cos_refracted = fresnel_dielectric(seen, index)
+            wi = refract(wo, m, seen, cos_refracted, index)
+            below = np.where(wi[2] < 0, facets.weight(wo, wi, m), f4(0))
+            kept = reflected * above + (f4(1) - reflected) * below
+            lost[side, k] = 1 - kept.reshape(COLUMNS, -1).mean(1, dtype=float)
+    lost = np.clip(lost, LEAST, 1)
+    means = _means(shape, lost, _place_of_refraction) * np.array([[1], [ior**2]])
+    denser = np.full(1, max(ior, 1 / ior), f4)
+    passed = 1 - float(mean_over_cosines(lambda mu: fresnel_dielectric(mu, denser)[0])[0])
+    return Loss(_fine(lost), means.astype(np.float32), passed, ior)
+
+
+def _rows(shape: Shape) -> list[tuple[Facets, float, float, float]]:
+    """Return facets, α along and across, and cos² of an azimuth of each row of a table."""
+
+    def row(alpha: float, turn: float) -> tuple[Facets, float, float, float]:
+        across = None if shape.alpha_v is None else np.full(1, shape.alpha_v, f4)
+        facets = Facets(np.full(1, alpha, f4), across, None, shape.beckmann, shape.separable)
+        return facets, alpha, shape.alpha_v or alpha, turn
+
+    if shape.alpha is None:
+        return [row(float(alpha), 1.0) for alpha in alpha_of(np.linspace(0, 1, ROUGHNESSES))]
+    return [row(shape.alpha, float(turn)) for turn in ([1.0] if shape.alpha_v is None else TURNS)]
+
+
+def _visible(facets: Facets, turn: float, cos: Doubles, shape: Shape) -> tuple[Floats, Floats]:
+    """Return directions of a cos² of the azimuth and cosines, and microfacets they see, (3, COLUMNS·k)."""
+    cos = np.clip(cos, 1e-4 * float(facets.alpha[0]), 1)
+    sin = np.sqrt(1 - cos * cos)
+    k = np.arange(count := NORMALS_OF_ONE if shape.alpha and shape.alpha_v is None else NORMALS)
+    u = np.stack([k * GOLDEN % 1, (k + 0.5) / count]).astype(f4)
+    wo = np.stack([sin * np.sqrt(turn), sin * np.sqrt(1 - turn), cos]).astype(f4).repeat(count, 1)
+    return wo, facets.visible_normals(wo, np.tile(u, COLUMNS))
+
+
+def _neighbors(x: Floats, size: int) -> list[tuple[Ints, Floats]]:
+    """Return the two entries of a table next to x in [0, 1], and their parts."""
+    x = np.clip(x.astype(float), 0, 1) * (size - 1)
+    i = np.minimum(x.astype(np.intp), size - 2)
+    return [(i, 1 - (x - i)), (i + 1, x - i)]
+
+
+def _fine(table: Doubles) -> Floats:
+    """Return a table (sides, rows, columns), with one row with so many columns that the nearest is enough."""
+    if table.shape[1] == 1:
+        fine, known = np.linspace(0, 1, FINE), np.linspace(0, 1, COLUMNS)
+        table = np.stack([np.interp(fine, known, side[0])[None] for side in table])
+    return table.astype(np.float32)
+
+
+def _means(shape: Shape, table: Doubles, place: Callable[[Facets, Floats], Place]) -> Doubles:
+    """Return the means of a table (sides, rows, COLUMNS) over cosines, (sides, r), by midpoints."""
+    turns = 1 if shape.alpha_v is None else AROUND
+    root, turned = ((np.arange(k) + f4(0.5)) / f4(k) for k in (MIDPOINTS, turns))
+    sin, cos = sin_cos_turns(turned * f4(0.25))
+    mu = np.tile(root * root, turns)
+    r = np.sqrt(f4(1) - mu * mu)
+    w = np.stack([r * cos.repeat(MIDPOINTS), r * sin.repeat(MIDPOINTS), mu])
+    weight = np.tile(4.0 * root**3, turns) / mu.size  # 2μ dμ
+    means = []
+    for k, (facets, *_) in enumerate(_rows(shape)[: len(table[0]) if shape.alpha is None else 1]):
+        part = table[:, k : k + 1] if shape.alpha is None else table
+        values = (interpolate(part, *place(facets, w), side) for side in range(len(table)))
+        means.append([(value * weight).sum() for value in values])
+    return np.array(means).T
