@@ -354,13 +354,26 @@ def test_glass_disperses_by_its_abbe_number(tmp_path: Path) -> None:
     ).bsdf.ior == pytest.approx(1.518, abs=2e-3)
 
 
-def test_the_coat_of_a_diffuse_surface_takes_light(tmp_path: Path) -> None:
-    thick = material(tmp_path, f'Material "coateddiffuse" {GRAY} "float thickness" .1').bsdf
-    # light that enters from all sides goes through 1.146 times the thickness, on the way down and up
-    cos = np.sqrt(1 - (1 - np.linspace(0, 1, 100_001) ** 2) / 1.5**2)
-    c = np.linspace(0, 1, 100_001)
-    mean = np.trapezoid(2 * c / cos, c)
-    np.testing.assert_allclose(rows(thick.reflectance), 0.5 * np.exp(-0.2 * mean), rtol=1e-4)
+@pytest.mark.parametrize(("thickness", "base", "within"), [(0.01, 0.8, 0.002), (0.1, 0.3, 0.02)])
+def test_the_coat_of_a_diffuse_surface_takes_light(
+    tmp_path: Path, thickness: float, base: float, within: float
+) -> None:
+    text = (
+        f'Material "coateddiffuse" "float thickness" {thickness} "rgb reflectance" [ {base} {base} {base} ]'
+    )
+    found = rows(material(tmp_path, text).bsdf.reflectance)[0]
+    cos = (np.arange(100_000) + 0.5) / 100_000
+    sin2 = (1 - cos * cos) * 1.5**2
+    out = np.sqrt(np.maximum(1 - sin2, 0))
+    parallel, across = (1.5 * out - cos) / (1.5 * out + cos), (1.5 * cos - out) / (1.5 * cos + out)
+    inside = np.where(sin2 >= 1, 1, (parallel**2 + across**2) / 2)
+    loss = np.exp(-thickness / cos)
+    back, clear = (2 * cos * inside * [loss**2, np.ones_like(cos)]).mean(1)
+    leaving = (2 * cos * loss * (1 - inside)).mean()
+    for up in (0.4, 1.0):  # the cosine of the light that enters
+        entry = np.exp(-thickness / np.sqrt(1 - (1 - up**2) / 1.5**2))
+        expected = entry * base * leaving / (1 - base * back)  # a series of reflections at base and boundary
+        assert found * (1 - clear) / (1 - found * clear) == pytest.approx(expected, rel=within)
 
 
 def test_bumps_opacity_and_media(tmp_path: Path) -> None:

@@ -7,7 +7,10 @@ from typing import Any
 
 import numpy as np
 
+from ...arrays.elementary import exp
+from ...arrays.vec import f4
 from ...bsdfs import Conductor, Dielectric, Diffuse, Mix, NullSurface, Plastic, Principled, ThinDielectric
+from ...bsdfs.fresnel import fresnel_dielectric
 from ...core.errors import SceneError, number
 from ...materials import Material
 from ...media import HenyeyGreenstein, Medium
@@ -18,6 +21,7 @@ from .entities import GRAY, NAMED, Entity, Job, converts, unsupported
 from .textures import Value, clipped, color, computed, fourth_root, scalar, square_root
 
 LEAST_INDEX = 1e-6
+CELLS = 1024  # of the cosine, for integrals over directions
 
 
 def _albedo(entity: Entity, name: str, default: float, job: Job, factor: float = 1.0) -> Value:
@@ -78,10 +82,26 @@ def _coated_diffuse(entity: Entity, job: Job) -> Material:
     if facets.pop("roughness_v", None) is not None:
         entity.lose("vroughness")
     thick = 0.0 if below else _layer(entity, job)
-    # what the layer lets through on the way down and up, at the mean of 1/cos after refraction
-    mean = 2 * ior * ior * (1 - np.sqrt(1 - 1 / ior**2)) if ior > 1 else 2.0
-    base = _albedo(entity, "reflectance", 0.5, job, float(np.exp(-2 * mean * thick)))
+    base = _albedo(entity, "reflectance", 0.5, job)
+    if thick:
+        base = computed(_below_coat, base, *_coat(thick, ior))
     return _made(entity, Plastic(base, ior=ior, nonlinear=True, **facets), job)
+
+
+def _coat(thickness: float, ior: float) -> tuple[float, ...]:
+    """Return what a coat that absorbs lets in and out, and what it and a clear one throw back on the base."""
+    cos = (np.arange(CELLS) + 0.5) / CELLS
+    inside = fresnel_dielectric(cos.astype(f4), np.full(1, 1 / ior, f4))[0].astype(float)
+    refracted = np.sqrt(np.maximum(1 - (1 - cos * cos) / ior**2, 1e-9))
+    kept, once = exp((-thickness / refracted).astype(f4)), exp((-thickness / cos).astype(f4)).astype(float)
+    parts = (kept, once * (1 - inside), once * once * inside, inside)  # weighted by the cosine
+    return tuple(float((2 * cos * each).mean()) for each in parts)
+
+
+def _below_coat(base: Any, entry: Any, leaving: Any, back: Any, clear: Any) -> Any:
+    """Return the reflectance below a clear coat that brings as much light out as this base below its coat."""
+    out = entry * leaving * base / (1 - back * base)
+    return out / (1 - clear + clear * out)
 
 
 def _layer(entity: Entity, job: Job) -> float:
