@@ -606,6 +606,51 @@ def test_settings_of_a_scene_are_checked() -> None:
         wf.render(wf.Scene(ball, settings={"max_bounces": -1}), size=(4, 4))
 
 
+# --- Media ----------------------------------------------------------------------------------------
+
+FOG = {"type": "homogeneous", "sigma_t": rgb(0.4, 0.6, 1), "albedo": rgb(0.5, 1, 0), "scale": 2}
+
+
+def test_media_and_phase_functions() -> None:
+    """Extinction times albedo is scattering; what they are without anything; a constant volume."""
+    halves = {"type": "blendphase", "weight": 0.3, "a": {"type": "hg", "g": 0.6}, "b": {"type": "rayleigh"}}
+    made = shape("sphere", bsdf={"type": "null"}, interior={**FOG, "phase": halves}).material
+    assert made.interior.sigma_s.ravel() == pytest.approx([0.4, 1.2, 0])
+    assert made.interior.sigma_a.ravel() == pytest.approx([0.4, 0, 2])
+    assert repr(made.interior.phase) == repr(wf.PhaseMix(wf.HenyeyGreenstein(0.6), wf.Rayleigh(), 0.3))
+    plain = shape("sphere", interior={"type": "homogeneous"}).material.interior
+    assert (plain.sigma_s[0, 0], plain.sigma_a[0, 0]) == (0.75, 0.25)
+    assert isinstance(plain.phase, wf.Isotropic)
+    half = {"type": "constvolume", "value": {"type": "rgb", "value": [0.5, 0.5, 0.5]}}
+    assert (
+        shape("cube", interior={"type": "homogeneous", "albedo": half}).material.interior.sigma_s[0, 0] == 0.5
+    )
+
+
+def test_shapes_with_one_bsdf_have_media_of_their_own() -> None:
+    glass = {"type": "dielectric", "id": "glass"}
+    one = {"type": "sphere", "bsdf": glass, "interior": {**FOG, "id": "fog"}}
+    two = {"type": "sphere", "bsdf": {"type": "ref", "id": "glass"}}
+    three = {"type": "cube", "bsdf": {"type": "ref", "id": "glass"}, "interior": {"type": "ref", "id": "fog"}}
+    first, second, third = (each.material for each in scene(one=one, two=two, three=three).shapes)
+    assert second.interior is None
+    assert first is third
+    assert first.bsdf is second.bsdf
+
+
+def test_the_medium_around_all_shapes() -> None:
+    """It is outside of a shape, or around the sensor, and inside of none."""
+    fog, inside = {**FOG, "id": "fog"}, {"type": "homogeneous", "id": "inside"}
+    ref = {"type": "ref", "id": "fog"}
+    nested = {"type": "sphere", "exterior": {"type": "ref", "id": "inside"}}
+    ball = {"type": "sphere", "radius": 2, "interior": inside, "exterior": ref}
+    made = scene(fog=fog, nested=nested, ball=ball, eye={"type": "perspective", "medium": ref})
+    assert made.medium.sigma_s.ravel() == pytest.approx([0.4, 1.2, 0])
+    assert scene(ball={"type": "sphere", "interior": inside}).medium is None
+    with pytest.warns(UserWarning, match="another medium around all shapes"):
+        scene(False, fog=fog, one=ball, two={"type": "cube", "exterior": {"type": "homogeneous"}})
+
+
 # --- What is not honored, and what is wrong -------------------------------------------------------
 
 
@@ -625,11 +670,7 @@ def test_unsupported_plugins_are_named(name: str) -> None:
     with pytest.warns(UserWarning, match="Mitsuba scene: not honored: ") as found:
         made = scene(False, **parts)
     assert len(found) == 1
-    assert (
-        (kind in str(found[0].message))
-        if kind in ("medium", "phase", "volume")
-        else (name in str(found[0].message))
-    )
+    assert (kind in str(found[0].message)) if kind in ("phase", "volume") else (name in str(found[0].message))
     assert made.shapes
     with pytest.raises(wf.SceneError, match="not honored"):
         scene(True, **parts)
@@ -803,6 +844,7 @@ def plugin_table() -> str:
         if each.convert is not None and each.kind != "scene":
             rows.setdefault((each.kind, each.reads, each.note), []).append(name)
     order = ("shape", "bsdf", "texture", "emitter", "sensor", "film", "rfilter", "sampler", "integrator")
+    order += ("medium", "phase", "volume")
     lines = ["| kind | plugins | reads | note |", "|---|---|---|---|"]
     for kind in order:
         for (own, reads, note), names in rows.items():

@@ -10,12 +10,9 @@ from ...scene import Scene
 from ..repair import RawMesh
 from ..sources import SceneFiles
 from . import bsdfs, emitters, shapes, textures  # noqa: F401  they fill the table
-from .nodes import Graph, Job, Node, plugin, unsupported
+from .media import medium_around
+from .nodes import Graph, Job, Node, plugin
 from .views import check_clipping
-
-unsupported("homogeneous heterogeneous", "medium")
-unsupported("isotropic hg rayleigh sggx tabphase blendphase", "phase")
-unsupported("constvolume gridvolume", "volume")
 
 
 def convert(
@@ -74,4 +71,4 @@ def _scene(node: Node, job: Job) -> Scene:
         check_clipping(seen[0][0], camera, found)
     if settings.get("background") and any(shape.emission is not None for shape in found):
         node.lose("hide_emitters for shapes that emit")
-    return Scene(found, lights, camera, settings=settings)
+    return Scene(found, lights, camera, settings=settings, medium=medium_around(node, job))

@@ -13,6 +13,7 @@ from ...bsdfs import Diffuse
 from ...core.errors import SceneError, finite_array, in_brief, number, one_of
 from ...core.suggestions import did_you_mean
 from ...materials import Material
+from ...media import Isotropic
 from ...shapes.transform import Matrix
 from ..placing import in_range
 from ..repair import RawMesh, warn
@@ -42,6 +43,7 @@ INSTEAD: dict[str, tuple[Any, str]] = {
     "rfilter": ({}, "the default in its place"),
     "integrator": ({}, "path tracing in its place"),
     "shape": ((), "left out"),
+    "phase": (Isotropic(), "isotropic in its place"),
 }
 COMMON = {  # parameters of all plugins of a kind that do not change the picture
     "emitter": ("sampling_weight",),

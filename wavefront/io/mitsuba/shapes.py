@@ -21,6 +21,7 @@ from ..placing import moved_raw
 from ..repair import RawMesh, build
 from .attributes import with_attribute
 from .bsdfs import is_one_sided
+from .media import interior_of
 from .nodes import Job, Node, plugin, unsupported
 from .serialized import read_serialized
 from .textures import upside_down
@@ -32,14 +33,14 @@ POLES = np.array([[0.0, 0, -1], [-1, 0, 0], [0, 1, 0]])  # from the axes of a `S
 SURFACE = "to_world flip_normals"
 
 
-@plugin("rectangle", "shape", SURFACE, "bsdf emitter")
+@plugin("rectangle", "shape", SURFACE, "bsdf emitter medium")
 def _rectangle(node: Node, job: Job) -> list[Shape]:
     corners = np.array([[-1.0, -1, 0], [1, -1, 0], [1, 1, 0], [-1, 1, 0]])
     faces = np.array([[0, 1, 2], [0, 2, 3]])
     return _mesh(node, job, RawMesh("rectangle", corners, faces, uvs=(corners[:, :2] + 1) / 2))
 
 
-@plugin("cube", "shape", SURFACE, "bsdf emitter")
+@plugin("cube", "shape", SURFACE, "bsdf emitter medium")
 def _cube(node: Node, job: Job) -> list[Shape]:
     sides = ((1, 5, 4, 0), (3, 2, 6, 7), (1, 3, 7, 5), (5, 7, 6, 4), (4, 6, 2, 0), (3, 1, 0, 2))
     number = np.array(sides).reshape(-1)  # of a corner: a bit for each axis
@@ -51,7 +52,7 @@ def _cube(node: Node, job: Job) -> list[Shape]:
     return _mesh(node, job, raw, closed=outside)
 
 
-@plugin("disk", "shape", SURFACE, "bsdf emitter", note="a mesh of 128 triangles")
+@plugin("disk", "shape", SURFACE, "bsdf emitter medium", note="a mesh of 128 triangles")
 def _disk(node: Node, job: Job) -> list[Shape]:
     ring, turns = _ring(np.sqrt(2 * np.pi / SIDES / sin_cos_turns(np.array([1 / SIDES]))[0][0]))
     count = np.arange(SIDES)
@@ -68,7 +69,7 @@ def _disk(node: Node, job: Job) -> list[Shape]:
     "cylinder",
     "shape",
     f"{SURFACE} p0 p1 radius",
-    "bsdf emitter",
+    "bsdf emitter medium",
     note="a mesh where it shines, is textured or elliptic",
 )
 def _cylinder(node: Node, job: Job) -> list[Shape]:
@@ -98,7 +99,7 @@ def _cylinder(node: Node, job: Job) -> list[Shape]:
     "sphere",
     "shape",
     f"{SURFACE} center radius",
-    "bsdf emitter",
+    "bsdf emitter medium",
     note="one radius",
 )
 def _sphere(node: Node, job: Job) -> list[Shape]:
@@ -126,7 +127,7 @@ def _sphere(node: Node, job: Job) -> list[Shape]:
     return [_named(ball, node)]
 
 
-@plugin("obj ply", "shape", f"{SURFACE} filename face_normals flip_tex_coords", "bsdf emitter")
+@plugin("obj ply", "shape", f"{SURFACE} filename face_normals flip_tex_coords", "bsdf emitter medium")
 def _file(node: Node, job: Job) -> list[Shape]:
     path = job.find(node.text("filename"))
     if path not in job.made:
@@ -141,7 +142,7 @@ def _file(node: Node, job: Job) -> list[Shape]:
     "serialized",
     "shape",
     f"{SURFACE} filename shape_index face_normals",
-    "bsdf emitter",
+    "bsdf emitter medium",
     note="versions 3 and 4",
 )
 def _serialized(node: Node, job: Job) -> list[Shape]:
@@ -216,6 +217,13 @@ def _appearance(node: Node, job: Job, closed: bool = False) -> tuple[Material, A
         one_sided = emission is None
     else:
         material, one_sided = job.convert(bsdfs[0]), is_one_sided(bsdfs[0])
+    interior = interior_of(node, job)
+    if interior is not None:
+        inside = (id(material), id(interior))
+        if inside not in job.made:
+            job.made[inside] = copy(material)
+            job.made[inside].interior = interior
+        material = job.made[inside]
     if not one_sided or closed:
         return material, emission
     key = (id(material), "one-sided")

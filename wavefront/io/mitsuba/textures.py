@@ -52,7 +52,9 @@ def color(node: Node, name: str, default: Any, job: Job, *, emission: bool = Fal
     if not isinstance(value, Node):
         return number(name, value)
     if value.plugin in ("rgb", "spectrum"):
-        return constant(value, job, emission=emission, bounded=not emission and name not in ("eta", "k"))
+        return constant(
+            value, job, emission=emission, bounded=not emission and name not in ("eta", "k", "sigma_t")
+        )
     if value.kind != "texture":
         raise SceneError(f"{name} is a {value.kind}; it must be a texture")
     return job.convert(value)

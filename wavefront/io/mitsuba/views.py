@@ -24,9 +24,9 @@ FIELD_OF_VIEW = "fov fov_axis focal_length"
 LENS = f"{FIELD_OF_VIEW} principal_point_offset_x principal_point_offset_y"
 
 
-@plugin("perspective", "sensor", f"{CLIPPED} {LENS}", "film sampler", note=NO_CLIPPING)
-@plugin("thinlens", "sensor", f"{CLIPPED} aperture_radius {LENS}", "film sampler", note=NO_CLIPPING)
-@plugin("orthographic", "sensor", CLIPPED, "film sampler", note=NO_CLIPPING)
+@plugin("perspective", "sensor", f"{CLIPPED} {LENS}", "film sampler medium", note=NO_CLIPPING)
+@plugin("thinlens", "sensor", f"{CLIPPED} aperture_radius {LENS}", "film sampler medium", note=NO_CLIPPING)
+@plugin("orthographic", "sensor", CLIPPED, "film sampler medium", note=NO_CLIPPING)
 def _sensor(node: Node, job: Job) -> tuple[Camera, Settings]:
     film = node.held("film")
     size, crop, settings = job.convert(film[0]) if film else ((768, 576), None, {"filter": "gaussian"})
