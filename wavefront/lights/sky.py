@@ -14,7 +14,7 @@ from ..arrays.soa import soa
 from ..arrays.state import SurfaceInteraction
 from ..arrays.vec import Doubles, Floats, column, dot, f4
 from ..camera import upward
-from ..colors import rgb
+from ..colors import from_photometric, rgb
 from ..core.errors import SceneError, finite_array, number
 from ..core.parameter import Parameter, Parametrized
 from ..film.aov_names import DEFAULT_GROUP, group_name
@@ -113,8 +113,7 @@ class Sky(Parametrized, Light):
 
     Notes
     -----
-    Values follow the unit of what a sky is scaled to: with an illuminance in lux for `horizontal` and
-    `direct_normal`, radiances are luminances in cd·m⁻², and irradiances are illuminances.
+    `from_photometric` turns illuminances in lux into the irradiances of white light that are asked for here.
 
     Raises
     ------
@@ -238,7 +237,8 @@ class Sky(Parametrized, Light):
         sun
             (3,) direction to the sun, of any length, above the horizon.
         illuminance
-            The same two in lux. Sky and sun are then scaled to these; the irradiances give the distribution.
+            The same two in lux, of white light as `from_photometric` has it. Sky and sun are then scaled to
+            these; the irradiances give the distribution.
         extraterrestrial
             Irradiance of the sun outside of the atmosphere, W·m⁻²; over the year it varies by 3.3 %.
         disk
@@ -267,9 +267,9 @@ class Sky(Parametrized, Light):
         direct = number("Sky direct_normal", direct_normal, lambda x: x >= 0, "at least 0")
         diffuse = number("Sky diffuse_horizontal", diffuse_horizontal, lambda x: x > 0, "above 0")
         beyond = number("Sky extraterrestrial", extraterrestrial, lambda x: x > 0, "above 0")
-        scaled = (
-            (direct, diffuse) if illuminance is None else finite_array("Sky illuminance", illuminance, (2,))
-        )
+        scaled: list[ArrayLike] = [direct, diffuse]
+        if illuminance is not None:
+            scaled = [from_photometric(lux) for lux in finite_array("Sky illuminance", illuminance, (2,))]
         return cls(
             perez_function(direct, diffuse, _height(sun, up), beyond),
             sun,
