@@ -56,7 +56,7 @@ def load(folder: Path, body: str, header: str = "", **options: object) -> wf.Sce
 def test_statements_have_their_words_numbers_and_parameters(tmp_path: Path) -> None:
     text = (
         '# a comment\nTranslate 1 -.5 2e1\n Texture "a \\"b\\"" "float" # c\n "imagemap" "string filename" '
-        '"x.png"\r\n "bool invert" true "bool b" [ "false" ] "rgb c" [ .1 # mid\n .2 .3 ] "integer n" 4'
+        '["x_1.png"]\r\n "bool invert" true "bool b" [ "false" ] "rgb c" [ .1 # mid\n .2 .3 ] "integer n" 4'
         ' "spectrum s" "metal-Au-k" "point3 P" [1 2 3\n4 5 6]'
     )
     move, texture = parse(tmp_path, text)
@@ -68,7 +68,7 @@ def test_statements_have_their_words_numbers_and_parameters(tmp_path: Path) -> N
     assert texture.words == ['a "b"', "float", "imagemap"]
     values = {name: (each.type, list(each.values)) for name, each in texture.parameters.items()}
     assert values == {
-        "filename": ("string", ["x.png"]),
+        "filename": ("string", ["x_1.png"]),
         "invert": ("bool", ["true"]),
         "b": ("bool", ["false"]),
         "c": ("rgb", [0.1, 0.2, 0.3]),

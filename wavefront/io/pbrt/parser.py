@@ -237,11 +237,13 @@ class _Text:
             while (token := self._next()) != "]":
                 if token in ("", "["):
                     raise PlacedError(f"{place}: the list of {name} has no end")
-                values.append(token.replace("_", "?"))  # which is part of numbers in Python
+                values.append(token)
         else:
             values = [self._next()]
         texts = bool(values) and values[0].startswith('"')
         if kind in NUMBERS or (kind == "spectrum" and not texts):
+            if whole is None:  # Python's numbers may have underscores
+                values = [value.replace("_", "?") for value in values]
             return _numbers(kind, name, values, place)
         if kind == "bool":
             values = [value.strip('"') for value in values]
