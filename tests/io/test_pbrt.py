@@ -729,6 +729,11 @@ def test_objects_are_placed_by_both_transforms(tmp_path: Path) -> None:
         ),
         (
             "",
+            'AreaLightSource "diffuse" Shape "sphere" "float alpha" 0',
+            "'sphere': alpha 0 of an area light",
+        ),
+        (
+            "",
             f'AreaLightSource "diffuse" ObjectBegin "o" {SQUARE} ObjectEnd ObjectInstance "o"',
             "shape 'trianglemesh': the light of a shape in an object",
         ),

@@ -201,12 +201,13 @@ def instances(entity: Entity, job: Job, matrices: Matrix) -> list[Shape]:
 
 def _exact_sphere(entity: Entity, job: Job, matrix: Matrix) -> Sphere | None:
     """Return a sphere that needs no mesh: a whole one, without textures, that is not stretched."""
-    if entity.type != "sphere" or entity.values.keys() - {"radius"} or entity.state.reverse:
+    if entity.type != "sphere" or entity.values.keys() - {"radius", "alpha"} or entity.state.reverse:
         return None
     scale = np.linalg.svd(matrix[:3, :3], compute_uv=False)
     if np.ptp(scale) > ROUND * scale.max():
         return None
-    radius, material = _radius(entity) * scale[0], material_of(entity.state, None, job, entity)
+    alpha, radius = _opacity(entity, entity.state.area, job), _radius(entity) * scale[0]
+    material = material_of(entity.state, alpha, job, entity)
     emission, _ = _emission(entity.state.area, 4 * np.pi * radius**2, job)
     if has_textures(material) or isinstance(emission, BaseTexture):
         return None
@@ -226,7 +227,7 @@ def _mesh(entity: Entity, job: Job, matrix: Matrix, light: Entity | None) -> Mes
         area = float(np.linalg.norm(np.cross(b - a, c - a), axis=1).sum()) / 2 if light else 0.0
     job.triangles += len(raw.faces)
     job.files.limits.check_triangles(str(job.files.scene), job.triangles)
-    raw.material = material_of(entity.state, opacity(entity, job), job, entity)
+    raw.material = material_of(entity.state, _opacity(entity, light, job), job, entity)
     raw.emission, raw.two_sided = _emission(light, area, job)
     if raw.uvs is None and (has_textures(raw.material) or isinstance(raw.emission, BaseTexture)):
         uvs = np.tile([[0.0, 0], [1, 0], [1, 1]], (len(raw.faces), 1))  # of each triangle, as in pbrt
@@ -235,9 +236,15 @@ def _mesh(entity: Entity, job: Job, matrix: Matrix, light: Entity | None) -> Mes
     return build(entity.place, raw, job.strict)
 
 
-def opacity(entity: Entity, job: Job) -> Any:
+def _opacity(entity: Entity, light: Entity | None, job: Job) -> Any:
     """Return the opacity of a shape; None where none is given."""
-    return clipped(scalar(entity, "alpha", 1.0, job)) if "alpha" in entity.values else None
+    if "alpha" not in entity.values:
+        return None
+    alpha = clipped(scalar(entity, "alpha", 1.0, job))
+    if light is None or isinstance(alpha, BaseTexture) or alpha > 0:
+        return alpha
+    entity.lose("alpha 0 of an area light, which pbrt does not show; it is seen")
+    return None
 
 
 def _emission(light: Entity | None, area: float, job: Job) -> tuple[Any, bool]:
