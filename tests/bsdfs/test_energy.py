@@ -5,8 +5,9 @@ import pytest
 from scipy import stats
 from test_bsdfs import Constant, surface
 
+import wavefront as wf
 from wavefront.bsdfs import Bsdf, Conductor, Dielectric, Principled, ThinDielectric
-from wavefront.bsdfs.energy import Shape, loss, mean_over_cosines, scaling
+from wavefront.bsdfs.energy import Shape, loss, mean_over_cosines, part_kept, scaling
 from wavefront.bsdfs.rough import RoughBsdf
 
 F4 = np.float32
@@ -150,3 +151,45 @@ def test_tables_have_their_shape_by_the_roughness(across: float | None) -> None:
     alpha_v = None if across is None else pytest.approx(0.09)
     assert Rough(0.5).shape == (pytest.approx(0.25), alpha_v, True, True)
     assert Rough(Constant(0.5)).shape == (None, None, True, True)
+
+
+def test_a_metal_keeps_its_part() -> None:
+    """F·M/(1 − F·(1 − M)), by a sum over the further reflections, each of F after the part 1 − M."""
+    metal = Conductor(1.0, 1.0, 0.8)
+    mean = float(scaling(metal.shape).albedo[0, 0])
+    reflectance = np.array([[0.2], [0.7], [1.0]])
+    series = sum(reflectance * mean * (reflectance * (1 - mean)) ** k for k in range(200))
+    assert part_kept(metal, reflectance.astype(F4)) == pytest.approx(series, rel=1e-5)
+
+
+@pytest.mark.parametrize("ior", [1.1, 1.5, 1 / 1.33])
+@pytest.mark.parametrize("across", [None, 0.4])
+def test_the_lobe_of_glass_returns_what_is_lost(ior: float, across: float | None) -> None:
+    glass = Dielectric(ior, 0.7, roughness_v=across)
+    table = loss(glass.shape, ior)
+    k = np.arange(1 << 15)
+    u = (0.5 + k * np.array([[0.8191725134], [0.6710436067], [0.5497004779]])) % 1  # evenly spread
+    for mu in (0.9, 0.3):
+        wo = toward(mu, 1.0, k.size)
+        for side in (False, True):
+            inside, eta = np.full(k.size, side), 1 / ior if side else ior
+            wi = table.directions(glass, u.astype(F4), inside)
+            value, density, chance = table.lobe(glass, wo, wi, inside)
+            energy = value * np.abs(wi[2]) * np.where(wi[2] < 0, eta**2, 1) / density
+            assert energy.mean(dtype=float) == pytest.approx(chance[0], rel=5e-3)
+
+
+def test_glass_within_glass_is_without() -> None:
+    """The index around may differ from point to point."""
+    wo, wi = toward(0.8, 0.0, 100), toward(0.5, 1.0, 100)
+    at = surface(wo)
+    at.index_around = np.full(100, 1.2, F4)
+    both = (Dielectric(1.5, 0.8, multiscatter=on).bind(at).f(wo, wi) for on in (True, False))
+    np.testing.assert_array_equal(*both)
+
+
+@pytest.mark.parametrize("plugin", ["roughconductor", "roughdielectric"])
+def test_scenes_of_mitsuba_scatter_once(plugin: str) -> None:
+    ball = {"type": "sphere", "bsdf": {"type": plugin, "alpha": 0.5}}
+    scene = wf.from_mitsuba({"type": "scene", "ball": ball})
+    assert not scene.shapes[0].material.bsdf.multiscatter
