@@ -36,6 +36,7 @@ SHAPES = {  # the picture of --size 24, (height, width)
     "own_material": (15, 24),
     "photograph": (16, 24),
     "scan": (16, 24),
+    "skies": (32, 72),
     "spheres": (16, 24),
     "terrace": (13, 24),
 }
