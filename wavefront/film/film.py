@@ -293,8 +293,10 @@ class Film(Sums):
         for span in chunks(relative.size):
             deviations = self.deviations(span)
             batches = (deviations != 0).any(1).sum(0).clip(3)
-            square, cube = np.square(deviations).sum(0), (deviations**3).sum(0)
-            skewness = (cube / np.maximum(square, TINY) ** 1.5).mean(0)
+            squares = np.square(deviations)
+            square, cube = squares.sum(0), np.multiply(squares, deviations, out=squares).sum(0)
+            square = np.maximum(square, TINY)
+            skewness = (cube / (square * np.sqrt(square))).mean(0)
             skewed[span] = skewness * np.sqrt(batches * (batches - 1.0)) / (batches - 2)
         return float(max(0.0, (skewed * relative).sum() / relative.sum()))
 
