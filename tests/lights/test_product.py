@@ -30,6 +30,15 @@ def lighting(image: np.ndarray, normal: tuple[float, ...], opaque: bool = True, 
     return wf.Environment(image, **options).record(np.zeros(3)).compensated().lighting(receiver)
 
 
+def test_tables_are_made_once_for_an_environment() -> None:
+    """And anew when it has got another image."""
+    sky = wf.Environment(np.random.default_rng(1).random((8, 16, 3)))
+    tables = sky.record(np.zeros(3)).compensated()
+    assert sky.record(np.ones(3)).compensated() is tables
+    sky.radiance = np.random.default_rng(2).random((8, 16, 3))
+    assert sky.record(np.zeros(3)).compensated() is not tables
+
+
 @pytest.mark.parametrize("shape", [(24, 40), (5, 9), (1, 2), (70, 133)])
 def test_densities_are_one_over_the_image(shape: tuple[int, int]) -> None:
     light = np.random.default_rng(1).random(shape) ** 4

@@ -48,6 +48,7 @@ class ImageEnvironment(InfiniteLight):
     share: float = 1.0  # of the light that light samples are to bring
     product: CosineProduct | None = None  # draws that share
     normals: Ints | None = None  # (n,) what it is drawn for; None for no normal in particular
+    made: Self | None = None  # what `compensated` has returned
     takes_receiver: ClassVar[bool] = True
 
     @classmethod
@@ -89,8 +90,13 @@ class ImageEnvironment(InfiniteLight):
     def compensated(self) -> Self:
         """Draw directions by how much brighter than the mean they are, and leave the rest to BSDF samples.
 
-        In an image that is nearly the same all around, nothing is left to draw.
+        In an image that is nearly the same all around, nothing is left to draw. The tables are made once.
         """
+        if self.made is None:
+            self.made = self._compensated()
+        return self.made
+
+    def _compensated(self) -> Self:
         weights = self.texels.weights()  # density over the unit square; 1/(4π) per steradian is the mean
         excess = np.maximum(weights - 0.5 * len(self.step) * self.step[:, None], 0)
         share = float(excess.mean())
