@@ -141,6 +141,16 @@ def test_lights_below_the_horizon_are_chosen_seldom() -> None:
         assert sideways == pytest.approx(0.5, abs=1e-3)
 
 
+def test_a_light_in_the_cell_is_chosen_from_any_side() -> None:
+    """Its nearest surfaces get nearly all of their light from it, wherever in the cell it is."""
+    others = 8 * np.concatenate([np.eye(3), -np.eye(3)], 1)
+    for near in np.random.default_rng(1).uniform(-2, 2, (20, 3, 1)):
+        place = np.concatenate([near, others], 1).astype(f4)
+        choice = LightTable([PointLightRecord(place, np.ones((3, 7), f4))], 10).choice
+        for normal in others.T:
+            assert lit(choice, normal / 8, 1).pmf(np.zeros(1, np.intp), place[:, :1])[0] > 0.9
+
+
 class Flipping(wf.LightSampler):
     """A user's choice, which knows nothing of normals."""
 

@@ -137,12 +137,15 @@ class _Groups:
         above the horizon, and ¼ for directions all over the sphere.
         """
         towards = self.middle[:, None] - center[:, :, None]
-        towards *= SPREAD / np.sqrt((towards * towards).sum(0) + self.extent2 + radius**2)
+        square = (towards * towards).sum(0)
+        towards *= SPREAD / np.sqrt(square + self.extent2 + radius**2)
         spread = np.maximum(1 - (towards * towards).sum(0), 0) / 4 + LEAST_SPREAD
         x, y, z = _orientations()
         h = x * towards[0, :, None] + y * towards[1, :, None] + z * towards[2, :, None]
         cosine = (h + np.sqrt(h * h + spread[:, None])) / 2
-        cosine = 1 + (cosine - 1) * self.placed
+        # the nearest points of a cell get most light from a light in it, from any side
+        far = np.square(square / radius**2)
+        cosine = 1 + (cosine - 1) * (self.placed * far / (1 + far))[:, None]
         cosine[:, ANY] = 1
         return np.asarray(cosine)
 
