@@ -18,7 +18,7 @@ SQUARE = {
     "uniform_cone": st.tuples(st.floats(-6, 0.3).map(lambda x: float(np.float32(min(10.0**x, 2.0))))),
     "uniform_disk": EMPTY,
     "uniform_triangle": EMPTY,
-    "bilinear": st.tuples(st.tuples(*[st.floats(0.03125, 1, width=32)] * 4)),
+    "linear": st.tuples(st.tuples(*[st.floats(-0.96875, 0.96875, width=32)] * 2).map(lambda s: columns(*s))),
 }
 LINE = {"tent": st.tuples(st.floats(0.25, 4)), "gaussian": st.tuples(st.floats(0.2, 2), st.floats(0.5, 3))}
 WITHOUT_POINT = ("uniform_cone_pdf",)  # constant densities, which take no point
@@ -46,6 +46,8 @@ def test_density_of_points(name: str, data: st.DataObject, u: tuple[float, float
     with doubles():
         w = sample(columns(*u), *more)
         assert_density(lambda v: sample(v, *more), u, pdf(w, *more)[0])
+        if name == "linear":
+            np.testing.assert_allclose(warp.linear_with_density(columns(*u), *more)[1], pdf(w, *more))
         np.testing.assert_allclose(inverse(w, *more)[:, 0], u, atol=1e-6)
     single = sample(columns(*u).astype(np.float32), *map(np.float32, more))
     assert single.dtype == np.float32
@@ -79,7 +81,7 @@ def test_densities_integrate_to_one(name: str, data: st.DataObject) -> None:
     """The midpoint rule, over z and the azimuth, or over a square of the plane."""
     more = data.draw(SQUARE[name])
     _, pdf, _ = of(name)
-    if name == "bilinear":  # over the unit square alone
+    if name == "linear":  # over the unit square alone
         p = ((np.indices((50, 50)).reshape(2, -1) + 0.5) / 50).astype(np.float32)
         assert pdf(p, *more).mean(dtype=float) == pytest.approx(1, abs=1e-5)
         return

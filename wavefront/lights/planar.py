@@ -14,8 +14,8 @@ from ..arrays.vec import TINY, Floats, dot, f4, positive
 from .base import Emitters, LightRecord, Receiver
 
 LEAST_SQUARE = f4(1e-35)  # added to squared distances before their root, so that nothing is divided by 0
-LEAST_COS = f4(0.02)  # between a surface and a corner that counts; smaller ones count as this one
-NEAREST = f4(1e-6)  # squared distance to the nearest corner that counts, over that to the first
+MOST_SLOPE = f4(0.9)  # small densities make rare, bright samples
+LEVEL = f4(1.001)  # 1, and a little more, so that nothing is divided by 0
 EDGE_ON = f4(1e-14)  # taken off cosines that are divided by; smaller ones count as those of a dark side
 
 
@@ -80,42 +80,46 @@ class PlanarLights(LightRecord):
         return Emitters(self._middle().astype(np.float64), facing, self.area.astype(np.float64))
 
     def lighting(self, receiver: Receiver) -> Self:
-        """Return the lights as they are sampled for surfaces, by what arrives from their corners."""
+        """Return the lights as they are sampled for surfaces, by what arrives from their sides."""
         return replace(self, receiver=receiver) if self.few else self
 
-    def _corners(self, point: Floats, near: bool = False) -> tuple[Floats, ...] | None:
-        """Return relative densities (n,) at four corners for `warp.bilinear`; None where no surface is known.
+    def _across(self) -> tuple[Floats, Floats]:
+        """Return the ways (3, k) across, between the middles of opposite sides of the square of u."""
+        return self.edge_u, self.edge_v
 
-        They are per area, or `near` per solid angle. Corners are `corner`, those along `edge_u`, along
-        `edge_v`, and along both; of a triangle, the last is the middle between the two before it.
+    def _slopes(self, away: Floats, near: bool = False) -> Floats | None:
+        """Return slopes (2, n) for `warp.linear`, given the way (3, n) to the middle of the square of u.
+
+        They are None where no surface is known. At the middles of opposite sides, densities have the ratio of
+        what arrives from there, per area or `near` per solid angle: of cosθ/d³ or of cosθ. If heights above
+        the surface are c ± k and squared distances q ± g, these have the ratios (1 + a)/(1 − a), a = k/c, and
+        (1 + b)/(1 − b), b = g/q. Products of such ratios add a and b as hyperbolic tangents add.
 
         Source: M. Pharr, W. Jakob and G. Humphreys, Physically Based Rendering, 4th edition, 2023, section
-        6.5.3, for cosines and solid angles.
+        6.5.3, for a warp by what arrives.
         """
         if self.receiver is None:
             return None
         normal = self.receiver.normal
         if not self.receiver.opaque.all():
             normal = normal * self.receiver.opaque  # light from everywhere counts
-        corner, both = self.corner - point, f4(self.parallelograms)
-        d2, high = dot(corner, corner), dot(normal, corner)  # squared distance; cosine times distance
-        least = LEAST_COS * np.sqrt(d2)
-        high_u, high_v = dot(normal, self.edge_u), dot(normal, self.edge_v)
-        d2_u, d2_v = (f4(2) * dot(corner, edge) for edge in (self.edge_u, self.edge_v))
-        across = both * (self.edge_u + self.edge_v)
-        nearest = np.maximum(d2 * NEAREST, TINY)  # where a corner is at the point itself
-        corners = []
-        for rise, square in (
-            (high, d2),
-            (high + high_u, d2 + (d2_u + dot(self.edge_u, self.edge_u))),
-            (high + high_v, d2 + (d2_v + dot(self.edge_v, self.edge_v))),
-            (high + both * (high_u + high_v), d2 + (both * (d2_u + d2_v) + dot(across, across))),
-        ):
-            ratio = d2 / np.maximum(square, nearest)
-            ratio = np.sqrt(ratio, out=ratio) if near else np.multiply(ratio, ratio, out=ratio)
-            ratio *= np.maximum(rise, least)
-            corners.append(ratio)
-        return tuple(corners)
+        across = self._across()
+        height, square = np.maximum(f4(2) * dot(normal, away), TINY), dot(away, away)
+        a, b = _dots(across, normal), _dots(across, away)
+        a = a / np.maximum(np.abs(a), height)
+        for row, side in zip(b, across, strict=True):
+            row /= square + f4(0.25) * dot(side, side)
+        falls = b * b
+        if near:
+            np.sqrt(np.maximum(f4(1) - falls, f4(0)), out=falls)
+        falls += f4(1)
+        b /= falls
+        if not near:
+            b += b
+        np.multiply(a, b, out=falls)
+        a -= b
+        a /= LEVEL - falls
+        return a.clip(-MOST_SLOPE, MOST_SLOPE)
 
     def _middle(self) -> Floats:
         return self.corner + (self.edge_u + self.edge_v) / self.middle
@@ -133,6 +137,16 @@ class TwoSided:
 
     def _facing(self, rise: Floats) -> Floats:
         return np.abs(rise)
+
+
+def _dots(sides: tuple[Floats, Floats], v: Floats) -> Floats:
+    """Return the dot products (2, n) of two vectors (3, k) with vectors v (3, n)."""
+    out = np.empty((2, v.shape[1]), f4)
+    for row, side in zip(out, sides, strict=True):
+        np.multiply(side[0], v[0], out=row)
+        row += side[1] * v[1]
+        row += side[2] * v[2]
+    return out
 
 
 def area_pdf(d2: Floats, cos_light: Floats, area: Floats) -> Floats:

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from ..arrays.soa import soa
 from ..arrays.vec import Floats, Ints, dot, f4, put, take
 from ..sampling.spherical import SphericalRectangle
-from ..sampling.warp import bilinear, bilinear_pdf
+from ..sampling.warp import linear_pdf, linear_with_density
 from ..shapes.fans import are_fans, disjoint_pairs
 from .base import LightSample
 from .planar import LEAST_SQUARE, PlanarLights, TwoSided, area_pdf
@@ -19,6 +19,7 @@ from .planar import LEAST_SQUARE, PlanarLights, TwoSided, area_pdf
 NEAR = f4(1)  # squared distance, in areas, within which solid angle is sampled
 ROOT_NEAR = np.sqrt(NEAR)
 HIGH = f4(0.25)  # height, in widths, from which float32 is enough for solid angles
+HALF = f4(0.5)
 ON = f4(1e-5)  # height, in widths, of points on the rectangle itself
 SQUARE = 1e-6  # how far, relative to its sides, a pair of triangles may be from a rectangle
 
@@ -42,32 +43,31 @@ class RectangleLights(PlanarLights):
     def sample_li(self, point: Floats, u: Floats) -> LightSample:
         """Draw a point by area, or from nearby a direction in solid angle.
 
-        The density is uniform, or for surfaces one that is bilinear between the corners.
+        The density is uniform, or for surfaces one that is linear along both edges.
         """
-        corners = self._corners(point)
-        p = u if corners is None else bilinear(u, corners)
-        wi = self.edge_u * p[0]
-        wi += self.edge_v * p[1]
-        wi += self.corner
-        wi -= point
+        wi = self._middle() - point
+        slope = self._slopes(wi)
+        p, over_area = (u, None) if slope is None else linear_with_density(u, slope)
+        wi += self.edge_u * (p[0] - HALF)
+        wi += self.edge_v * (p[1] - HALF)
         height = self._facing(self._rise(point))
-        near = list(self._near(point, height))
         pdfs = []
-        for lanes, seen, warp in near:
-            some = u.take(lanes, 1)
+        for lanes, seen, warp in self._near(point, height):
+            some, density = u.take(lanes, 1), seen.pdf()
             if warp is not None:
-                some = bilinear(some, warp)
-            pdfs.append(seen.pdf() if warp is None else seen.pdf() * bilinear_pdf(some, warp))
+                some, over_square = linear_with_density(some, warp)
+                density *= over_square
+            pdfs.append((lanes, density))
             put(wi, lanes, seen.sample(some))
         d2 = dot(wi, wi)
         distance = np.sqrt(d2 + LEAST_SQUARE)
         wi /= distance
         cos_light = height / distance
         pdf = area_pdf(d2, cos_light, self.area)
-        if corners is not None:
-            pdf *= bilinear_pdf(p, corners)
-        for (lanes, _, _), part in zip(near, pdfs, strict=True):
-            pdf[lanes] = part
+        if over_area is not None:
+            pdf *= over_area
+        for lanes, density in pdfs:
+            pdf[lanes] = density
         return LightSample(wi, np.broadcast_to(self.radiance, wi.shape), pdf, distance, cos_light)
 
     def pdf_li(self, point: Floats, wi: Floats) -> Floats:
@@ -75,17 +75,18 @@ class RectangleLights(PlanarLights):
         rise, fall = self._rise(point), -dot(self.normal, wi)
         cos_light = self._facing(fall)
         t = rise / np.where(cos_light > 0, fall, f4(1))
-        on_plane = wi * t - (self.corner - point)
-        p = np.stack([dot(on_plane, edge) / dot(edge, edge) for edge in (self.edge_u, self.edge_v)])
+        away = self._middle() - point
+        on_plane = wi * t - away
+        p = np.stack([dot(on_plane, edge) / dot(edge, edge) for edge in (self.edge_u, self.edge_v)]) + HALF
         meets = (cos_light > 0) & (t > 0) & ((p >= 0) & (p <= 1)).all(0)
         pdf = area_pdf(t * t, cos_light, self.area)
-        corners = self._corners(point)
-        if corners is not None:
-            pdf *= bilinear_pdf(p.clip(f4(0), f4(1)), corners)
-        for lanes, seen, warp in self._near(point, np.where(meets, self._facing(rise), f4(0))):
+        slope = self._slopes(away)
+        if slope is not None:
+            pdf *= linear_pdf(p.clip(f4(0), f4(1)), slope)
+        for lanes, seen, warp in self._near(point, np.where(meets, self._facing(rise), f4(0)), np.inf):
             pdf[lanes] = seen.pdf()
             if warp is not None:
-                pdf[lanes] *= bilinear_pdf(seen.inverse(wi.take(lanes, 1)), warp)
+                pdf[lanes] *= linear_pdf(seen.inverse(wi.take(lanes, 1)), warp)
         return np.where(meets, pdf, f4(0))
 
     def _rise(self, point: Floats) -> Floats:
@@ -93,23 +94,23 @@ class RectangleLights(PlanarLights):
         return dot(self.normal, point) - dot(self.normal, self.corner)
 
     def _near(
-        self, point: Floats, height: Floats
-    ) -> Iterator[tuple[Ints, SphericalRectangle, tuple[Floats, ...] | None]]:
+        self, point: Floats, height: Floats, high: float | np.floating = HIGH
+    ) -> Iterator[tuple[Ints, SphericalRectangle, Floats | None]]:
         """Yield lanes of points that get light and are close to the middle, for the rectangle's size.
 
-        With them come the rectangles as seen from there, and densities at their corners. From afar both
+        With them come the rectangles as seen from there, and the slopes of densities. From afar both
         densities are alike, and sampling the area costs less. Points on the rectangle itself are none of
-        these.
+        these. Above the height `high`, in widths, float32 is used, which takes less time for many points.
         """
         width = np.sqrt(self.area)
         low = np.flatnonzero((height > ON * width) & (height < ROOT_NEAR * width))
         if not low.size:
             return
         some = self._at(low)
-        away = some.corner + f4(0.5) * (some.edge_u + some.edge_v) - point.take(low, 1)
+        away = some._middle() - point.take(low, 1)
         near = low.compress(dot(away, away) < NEAR * some.area)
-        high = height.take(near) > HIGH * (width if width.size == 1 else width.take(near))
-        for lanes, dtype in ((near.compress(high), np.float32), (near.compress(~high), np.float64)):
+        above = height.take(near) > f4(high) * (width if width.size == 1 else width.take(near))
+        for lanes, dtype in ((near.compress(above), np.float32), (near.compress(~above), np.float64)):
             if lanes.size:
                 yield lanes, *self._seen(take(point, lanes), lanes, dtype)
 
@@ -119,13 +120,13 @@ class RectangleLights(PlanarLights):
 
     def _seen(
         self, point: Floats, lanes: Ints, dtype: type[np.floating]
-    ) -> tuple[SphericalRectangle, tuple[Floats, ...] | None]:
-        """Return rectangles as seen from the points (3, k) of some lanes, and densities at their corners."""
+    ) -> tuple[SphericalRectangle, Floats | None]:
+        """Return rectangles as seen from the points (3, k) of some lanes, and the slopes of densities."""
         some = self._at(lanes)
         if self.receiver is not None:
             some = some.lighting(self.receiver if len(self.receiver) == 1 else self.receiver.take(lanes))
         seen = SphericalRectangle.of(some.corner - point, some.edge_u, some.edge_v, dtype)
-        return seen, some._corners(point, near=True)
+        return seen, some._slopes(some._middle() - point, near=True)
 
 
 @soa

@@ -9,10 +9,11 @@ from numpy.typing import NDArray
 
 from ..arrays.soa import soa
 from ..arrays.vec import Floats, cross, dot, f4
-from ..sampling.warp import bilinear, bilinear_pdf, uniform_triangle, uniform_triangle_inverse
+from ..sampling.warp import linear_pdf, linear_with_density, uniform_triangle, uniform_triangle_inverse
 from .base import LightSample
 from .planar import LEAST_SQUARE, PlanarLights, TwoSided, area_pdf
 
+MIDDLE = f4(0.375)  # part of both edges: between the middles of opposite sides of the square of u
 FEW = 128  # triangles at most that are sampled for surfaces; of more, each is small
 
 
@@ -37,20 +38,19 @@ class TriangleLights(PlanarLights):
 
     def _sample_at(self, point: Floats, u: Floats) -> tuple[LightSample, Floats]:
         """Return samples, and the barycentric weights b1, b2 (2, n) of their points."""
-        corners = self._corners(point)
-        p = u if corners is None else bilinear(u, corners)
+        wi = self.corner - point
+        slope = self._slopes(wi + MIDDLE * (self.edge_u + self.edge_v))
+        p, over_square = (u, None) if slope is None else linear_with_density(u, slope)
         b = uniform_triangle(p)
-        wi = self.edge_u * b[0]
+        wi += self.edge_u * b[0]
         wi += self.edge_v * b[1]
-        wi += self.corner
-        wi -= point
         d2 = dot(wi, wi)
         distance = np.sqrt(d2 + LEAST_SQUARE)
         wi /= distance
         cos_light = self._facing(-dot(self.normal, wi))
         pdf = area_pdf(d2, cos_light, self.area)
-        if corners is not None:
-            pdf *= bilinear_pdf(p, corners)
+        if over_square is not None:
+            pdf *= over_square
         radiance = np.broadcast_to(self.radiance, wi.shape)
         return LightSample(wi, radiance, pdf, distance, cos_light), b
 
@@ -72,11 +72,16 @@ class TriangleLights(PlanarLights):
         meets = lit & (t > 0) & (b1 >= 0) & (b2 >= 0) & (b1 + b2 <= 1)
         t = np.where(meets, t, f4(0))  # elsewhere its square may be beyond float32
         pdf = t * t / (np.where(meets, cos_light, f4(1)) * self.area)
-        corners = self._corners(point)
-        if corners is None:
+        slope = self._slopes(MIDDLE * (self.edge_u + self.edge_v) - away)
+        if slope is None:
             return pdf
         b = np.where(meets, np.stack([b1, b2]), f4(0))
-        return pdf * bilinear_pdf(uniform_triangle_inverse(b), corners)
+        return pdf * linear_pdf(uniform_triangle_inverse(b), slope)
+
+    def _across(self) -> tuple[Floats, Floats]:
+        """Return the ways across; `uniform_triangle` moves the middles of the far sides."""
+        u, v = self.edge_u, self.edge_v
+        return f4(0.75) * u - f4(0.25) * v, f4(0.75) * v - f4(0.25) * u
 
 
 @soa

@@ -11,7 +11,6 @@ True
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -167,65 +166,41 @@ def uniform_triangle_inverse(b: Floats) -> Floats:
     return _stack(np.where(above, f4(2) * b[0], total), np.where(above, total, f4(2) * b[1]))
 
 
-def bilinear(u: Floats, corners: Sequence[Floats]) -> Floats:
-    """Return points (2, n) of the unit square, whose density is bilinear, for u (2, n).
+def linear(u: Floats, slope: Floats) -> Floats:
+    """Return points (2, n) of the unit square with the density ∏(1 + sᵢ(2xᵢ − 1)), for u (2, n).
 
     Parameters
     ----------
-    corners
-        Four times (n,): relative densities at (0, 0), (1, 0), (0, 1) and (1, 1), above 0.
+    slope
+        (2, n), between -1 and 1.
     """
-    left, right = corners[0] + corners[1], corners[2] + corners[3]
-    out = np.empty_like(u)
-    out[1] = _linear(u[1], left, right)
-    low, high = _across(corners, out[1])
-    out[0] = _linear(u[0], low, high)
-    return out
+    return linear_with_density(u, slope)[0]
 
 
-def bilinear_pdf(p: Floats, corners: Sequence[Floats]) -> Floats:
-    """Return the density of `bilinear` at points p (2, n) of the square."""
-    low, high = _across(corners, p[1])
-    high -= low
-    high *= p[0]
-    high += low
-    high /= f4(0.25) * ((corners[0] + corners[1]) + (corners[2] + corners[3]))
-    return high
-
-
-def bilinear_inverse(p: Floats, corners: Sequence[Floats]) -> Floats:
-    """Return the u (2, n) that `bilinear` maps to points p (2, n)."""
-    rows = corners[0] + corners[1], corners[2] + corners[3]
-    x, y = (
-        t * (low + low + (high - low) * t) / (low + high)
-        for t, (low, high) in zip(p, (_across(corners, p[1]), rows), strict=True)
-    )
-    return _stack(x, y)
-
-
-def _across(corners: Sequence[Floats], y: Floats) -> tuple[Floats, Floats]:
-    """Return the densities of `bilinear` on the left and on the right, (n,) each, at heights y (n,)."""
-    low, high = corners[2] - corners[0], corners[3] - corners[1]
-    low *= y
-    low += corners[0]
-    high *= y
-    high += corners[1]
-    return low, high
-
-
-def _linear(u: Floats, low: Floats, high: Floats) -> Floats:
-    """Return numbers (n,) in [0, 1] whose density goes from `low` to `high` (n,), for u (n,)."""
-    square = low * low
-    root = high * high
-    root -= square
-    root *= u
-    root += square
+def linear_with_density(u: Floats, slope: Floats) -> tuple[Floats, Floats]:
+    """Return `linear` and its density (n,) at once, which is the root that it takes."""
+    start = f4(1) - slope
+    root = slope * u
+    root *= f4(4)
+    root += start * start
     np.sqrt(root, out=root)
-    root += low
-    x = low + high
-    x *= u
-    x /= root
-    return np.minimum(x, f4(1), out=x)
+    x = u + u
+    x /= root + start
+    return np.minimum(x, f4(1), out=x), root[0] * root[1]
+
+
+def linear_pdf(p: Floats, slope: Floats) -> Floats:
+    """Return the density (n,) of `linear` at points p (2, n) of the square."""
+    each = p + p
+    each -= f4(1)
+    each *= slope
+    each += f4(1)
+    return each[0] * each[1]
+
+
+def linear_inverse(p: Floats, slope: Floats) -> Floats:
+    """Return the u (2, n) that `linear` maps to points p (2, n)."""
+    return p * ((f4(1) - slope) + slope * p)
 
 
 def _stack(a: Floats, b: Floats) -> Floats:

@@ -209,10 +209,11 @@ def shading(scene: CompiledScene, surface: SurfaceInteraction) -> Shading:
 
 def receiver_of(surface: SurfaceInteraction, groups: list[tuple[Lanes, Bsdf]]) -> Receiver:
     """Return what lights shine on."""
-    n = len(surface)
-    opaque = np.ones(n, np.bool_)
-    for lanes, bsdf in groups:
-        opaque[lanes] = not bsdf.transmissive
+    opaque = broadcast(True, len(surface))
+    if any(bsdf.transmissive for _, bsdf in groups):
+        opaque = opaque.copy()
+        for lanes, bsdf in groups:
+            opaque[lanes] = not bsdf.transmissive
     return Receiver(surface.ns, opaque)
 
 
