@@ -6,6 +6,7 @@ from scenes import probe
 from significance import Mean, assert_mean, assert_same_images, measure, render, repeat
 
 import wavefront as wf
+from wavefront.compile.media import PhaseBsdf
 
 ALL = ("naive", "direct_simple", "direct_mis", "full")
 FAR = wf.Sphere((0, 0, -1e4), 1, material=wf.Diffuse(0.0))  # a scene has a shape
@@ -67,16 +68,67 @@ def test_lens_and_parallel_cameras_inside() -> None:
     assert seen.min() == pytest.approx(np.exp(-0.5), rel=0.01)
 
 
+def test_instances_hold_media() -> None:
+    cube = block(wf.Medium(0.5, emission=1e-9))
+    placed = [
+        wf.Instance(cube, np.diag([1.0, 1, 2, 1])),
+        wf.Instance(cube, np.diag([1.0, 1, 1, 1]) + _moved(4)),
+    ]
+    camera = probe((0, 0, 0), (0, 0, 9))
+    assert render(wf.Scene(placed, wf.Environment(1), camera), 1).rgb == pytest.approx(np.exp(-3), rel=1e-5)
+
+
+def _moved(z: float) -> np.ndarray:
+    matrix = np.zeros((4, 4))
+    matrix[2, 3] = z
+    return matrix
+
+
+def test_lights_at_infinity_do_not_get_through_endless_fog() -> None:
+    scene = wf.Scene(FAR, [wf.Environment(1)], probe((0, 0, 0), (0, 0, 5)), medium=wf.Medium(0.1))
+    with pytest.warns(UserWarning, match="no light of an Environment or a DirectionalLight gets through"):
+        render(scene, 1)
+
+
+GRID = (np.indices((512, 512)).reshape(2, -1).astype(np.float32) + np.float32(0.5)) / np.float32(512)
+
+
+@pytest.mark.parametrize("length", [0.3, 1.5, np.inf])
+@pytest.mark.parametrize("throughput", [(1, 1, 1), (0.7, 0.2, 0.1), (0, 1, 1)])
+def test_weights_of_distances(length: float, throughput) -> None:
+    """Over all numbers their mean is σs(1 − exp(−σt·s))/σt where light is scattered, and exp(−σt·s) else.
+
+    The same for the mean of cos t, which tells where. Channels without throughput count for nothing.
+    """
+    record = wf.Medium((0.1, 0.5, 2), (1, 0.7, 0.2)).record(np.zeros(3))
+    n = GRID.shape[1]
+    zero, weight = np.zeros((3, n), np.float32), np.repeat(np.float32(throughput)[:, None], n, 1)
+    far = np.full(n, length, np.float32)
+    flight = record.sample(np.zeros(n, int), zero, zero, far, weight, GRID, None)
+    sigma_s, sigma = record.scattering.ravel(), record.extinction.ravel()
+    met = np.isfinite(flight.t)
+    t = (np.arange(200_000) + 0.5) * (min(length, 40) / 200_000)
+    for k in np.flatnonzero(throughput):
+        falling = sigma_s[k] * np.exp(-sigma[k] * t) * min(length, 40) / t.size
+        for form, due in ((np.ones_like, falling.sum()), (np.cos, (falling * np.cos(t)).sum())):
+            found = np.where(met, flight.weight[k] * form(np.where(met, flight.t, 0)), 0)
+            assert found.mean(dtype=float) == pytest.approx(due, abs=3e-3)
+        through = np.where(met, 0, flight.weight[k]).mean(dtype=float)
+        assert through == pytest.approx(np.exp(-sigma[k] * length), abs=3e-3)
+    carried = (weight * flight.weight).sum(0)
+    assert carried.max() <= weight[:, 0].sum() * (1 + 1e-5)  # no sample is brighter than its path
+
+
 # --- Emission --------------------------------------------------------------------------------------------
 
 
 @integrators
-@pytest.mark.parametrize("depth", [1e-4, 0.01, 2.0])
+@pytest.mark.parametrize("depth", [1e-4, 0.04, 2.0])
 def test_emission_along_a_ray(integrator: str, depth: float) -> None:
     """ε(1 − exp(−σ·t))/σ."""
     scene = wf.Scene(ball(wf.Medium(depth / 2, emission=3)), camera=probe((0, 0, 0), (0, 0, 5)))
     seen = render(scene, 1, integrator=integrator, lighting=None).rgb
-    assert seen == pytest.approx(3 * -np.expm1(-depth) / (depth / 2), rel=1e-4)
+    assert seen == pytest.approx(3 * -np.expm1(-depth) / (depth / 2), rel=1e-5)
 
 
 @pytest.mark.parametrize("bounces", [0, 1, 3, 60])
@@ -201,12 +253,41 @@ def test_direct_estimators_agree() -> None:
     assert_same_images(one, two, 0.05)
 
 
-def test_same_bits_whatever_workers_and_order() -> None:
-    one = render(room(FOG), 8, max_bounces=5).rgb
-    two = render(room(FOG), 8, max_bounces=5, workers=2, executor="threads").rgb
-    session = wf.Session(room(FOG), spp=8, max_bounces=5, workers=1, progress=False, accel="numpy")
+@pytest.mark.parametrize("options", [{"workers": 2, "executor": "threads"}, {"wave_size": 300}], ids=str)
+def test_same_bits_whatever_workers_and_waves(options) -> None:
+    one, two = (render(room(FOG), 8, max_bounces=5, **more).rgb for more in ({}, options))
     np.testing.assert_array_equal(one, two)
-    np.testing.assert_array_equal(one, session.run().rgb)
+
+
+def test_a_render_goes_on_from_a_checkpoint(tmp_path) -> None:
+    """With the same bits; not in another medium."""
+    whole = render(room(FOG), 8, max_bounces=3).rgb
+    path = tmp_path / "render.wfck"
+    render(room(FOG), 4, max_bounces=3, checkpoint=path)
+    with pytest.raises(wf.SceneError, match=r"another scene|checkpoint"):
+        render(room(wf.Medium(0.1, 0.2)), 8, max_bounces=3, checkpoint=path)
+    np.testing.assert_array_equal(render(room(FOG), 8, max_bounces=3, checkpoint=path).rgb, whole)
+
+
+@pytest.mark.slow
+def test_same_bits_in_processes() -> None:
+    one, two = (
+        render(room(FOG), 4, max_bounces=3, **more).rgb
+        for more in ({}, {"workers": 2, "executor": "processes"})
+    )
+    np.testing.assert_array_equal(one, two)
+
+
+def test_phase_functions_are_shaded_as_they_are() -> None:
+    """Value and density are p at the angle between the light's ways, and samples have the weight 1."""
+    phase = wf.HenyeyGreenstein(0.7)
+    bsdf, u = PhaseBsdf(phase), np.random.default_rng(0).random((2, 1000), np.float32)
+    wo = np.repeat(np.float32([[0], [0], [1]]), 1000, 1)
+    sample = bsdf.sample_f(wo, u)
+    np.testing.assert_allclose(sample.wi[2], -phase.sample(u[0]), rtol=1e-6)
+    assert (sample.weight == 1).all()
+    for f in (*bsdf.f(wo, sample.wi), bsdf.pdf(wo, sample.wi), sample.pdf, *bsdf.evaluate(wo, sample.wi)[0]):
+        np.testing.assert_allclose(f, phase.p(-sample.wi[2]), rtol=1e-6)
 
 
 # --- Priorities ------------------------------------------------------------------------------------------

@@ -11,6 +11,8 @@ from ..compile.scene import compile_scene
 from ..core.errors import warn_caller
 from ..core.progress import phase
 from ..integrators import INTEGRATORS, WITH_MIS
+from ..lights import DirectionalLight, Environment
+from ..media import Medium
 from ..scene import Scene
 from ..scene.lighting import choose_ground, choose_preset, lighted
 from ..settings import AUTO, Settings
@@ -55,6 +57,7 @@ class PreparedScene:
         self.lighted = lighted(scene, self.preset, ground=self.ground, up=up, camera=framed)
         if values["integrator"] == "naive":
             _warn_of_unseen_lights(self.lighted)
+        _warn_of_light_in_endless_fog(self.lighted)
         self._geometries: list[Geometry] = []
         self._fingerprint: str | None = None
         with phase("building the scene", settings.values["progress"]):
@@ -89,6 +92,16 @@ class PreparedScene:
         if self._fingerprint is None:
             self._fingerprint = scene_fingerprint(self.compiled, self._geometries)
         return self._fingerprint
+
+
+def _warn_of_light_in_endless_fog(scene: Scene) -> None:
+    """Warn of lights at infinity that do not get through the medium of a scene."""
+    far = any(isinstance(light, Environment | DirectionalLight) for light in scene.lights)
+    if far and isinstance(scene.medium, Medium) and (scene.medium.sigma_a + scene.medium.sigma_s).all():
+        warn_caller(
+            "the scene's medium has no end, so no light of an Environment or a DirectionalLight gets "
+            "through; a large box of wf.NullSurface() with this interior has one"
+        )
 
 
 def _warn_of_unseen_lights(scene: Scene) -> None:
