@@ -53,7 +53,7 @@ def standard(type: int, sun: np.ndarray, directions: np.ndarray) -> np.ndarray:
     return (1 + a * np.exp(b / cos_z)) * scattered
 
 
-def dome(rows: int = 256, columns: int = 512) -> tuple[np.ndarray, np.ndarray]:
+def dome(rows: int = 96, columns: int = 192) -> tuple[np.ndarray, np.ndarray]:
     """Directions (rows, columns, 3), and their cos·dω: Gauss's rule in sin²Z."""
     x, w = np.polynomial.legendre.leggauss(rows)
     sin2 = (x + 1) / 2  # cos Z·sin Z·dZ = d(sin²Z)/2
@@ -117,7 +117,7 @@ def test_perez_beside_radiance(direct: float, diffuse: float, height: float) -> 
 
 @pytest.mark.parametrize(("direct", "diffuse", "height"), [(0, 100, 30), (300, 200, 45), (850, 80, 60)])
 def test_perez_has_the_irradiances_that_were_measured(direct: float, diffuse: float, height: float) -> None:
-    around, weight = dome(512, 1024)
+    around, weight = dome(256, 512)
     sun = toward(height)
     sky = wf.Sky.perez(direct, diffuse, sun)
     level = (sky.radiance(around.reshape(-1, 3)) * weight.reshape(-1, 1)).sum(0)
@@ -126,12 +126,12 @@ def test_perez_has_the_irradiances_that_were_measured(direct: float, diffuse: fl
     lit = wf.Sky.perez(direct, diffuse, sun, illuminance=(9000, 11000), disk=False)
     assert lit.diffuse_horizontal == pytest.approx([11000 / 683] * 3)
     assert not lit.direct_normal.any()
-    ratio = lit.radiance(around[::64, 0]) / sky.radiance(around[::64, 0])
+    ratio = lit.radiance(around[::32, 0]) / sky.radiance(around[::32, 0])
     assert ratio == pytest.approx(11000 / 683 / diffuse, rel=1e-5)
 
 
-@pytest.mark.parametrize("direct", [0, 1, 20, 200, 1000])
-@pytest.mark.parametrize("diffuse", [0.5, 30, 500])
+@pytest.mark.parametrize("direct", [0, 1, 20, 1000])
+@pytest.mark.parametrize("diffuse", [0.5, 500])
 @pytest.mark.parametrize("height", [0.5, 20, 89.9])
 def test_perez_is_finite_and_positive_for_whatever_weather(direct, diffuse, height) -> None:
     around, _ = dome(16, 16)
@@ -153,7 +153,7 @@ SKIES = {
 def test_contract(name: str, mis: bool) -> None:
     """χ² of the directions against their density, ∫ pdf = 1, radiance of samples and of rays."""
     record = SKIES[name]().record(ORIGIN)
-    testing.check_light(record.compensated() if mis else record, samples=5_000, points=[[2, 1, 3]])
+    testing.check_light(record.compensated() if mis else record, samples=2_000, points=[[2, 1, 3]])
 
 
 @pytest.mark.parametrize("integrator", ["naive", "direct_simple", "direct_mis", "full"])

@@ -86,7 +86,7 @@ def test_light_of_the_sun_that_a_surface_reflects() -> None:
     """Below a large white ground in the sun, a point that looks down gets ρ·E, by the sun's patch."""
     ground = wf.Disk((0, -1, 0), (0, 1, 0), 300, material=wf.Diffuse(0.5))
     sun = np.array([0.6, 0.8, 0.0])
-    found = coefficients(wf.Scene([ground]), [(0, 0, 0)], (0, -1, 0), spp=4096)
+    found = coefficients(wf.Scene([ground]), [(0, 0, 0)], (0, -1, 0), spp=2048)
     year = found.annual(wf.Weather([1000], [1e-6], [sun]))
     at = found.patches.number(np.float32(sun.reshape(3, 1)))[0]
     cosine = found.patches.projected[at - 1] / found.patches.solid_angles[at]  # the mean over the patch
@@ -97,15 +97,15 @@ def test_light_of_the_sun_that_a_surface_reflects() -> None:
 
 def test_up_and_north_turn_patches_and_points_alike() -> None:
     tree = ((0.5, 0.8, -1.0), 0.6)
-    one = coefficients(wf.Scene([wf.Sphere(*tree)]), spp=4096)
+    one = coefficients(wf.Scene([wf.Sphere(*tree)]), spp=2048)
     x, y, z = tree[0]
-    other = coefficients(wf.Scene([wf.Sphere((x, -z, y), tree[1])]), normals=(0, 0, 1), up="z", spp=4096)
+    other = coefficients(wf.Scene([wf.Sphere((x, -z, y), tree[1])]), normals=(0, 0, 1), up="z", spp=2048)
     sky = one.sky_radiance(wf.Sky.cie(13, (0.5, 1, -1), horizontal=100))
     same = other.sky_radiance(wf.Sky.cie(13, (0.5, 1, 1), up="z", horizontal=100))
     assert sky == pytest.approx(same, rel=1e-4)
     (a, ea), (b, eb) = one.irradiance(sky), other.irradiance(same)
     within(a, b, np.hypot(ea, eb))
-    turned = coefficients(wf.Scene([wf.Sphere((-z, y, x), tree[1])]), north=(1, 0, 0), spp=4096)
+    turned = coefficients(wf.Scene([wf.Sphere((-z, y, x), tree[1])]), north=(1, 0, 0), spp=2048)
     c, ec = turned.irradiance(sky)
     within(a, c, np.hypot(ea, ec))
 
