@@ -134,10 +134,10 @@ def test_receivers_weigh_what_they_draw_by_their_density(kind: str, warp: Any) -
     assert (sample.wi == warp(u)).all()
     f, pdf = bsdf.evaluate(wo, sample.wi)
     np.testing.assert_allclose(sample.pdf, pdf, rtol=1e-6)
-    np.testing.assert_allclose(sample.weight, f * np.abs(sample.wi[2]) / pdf, rtol=1e-5)
+    cos = np.abs(sample.wi[2]) if kind == "irradiance" else 1
+    np.testing.assert_allclose(sample.weight, f * cos / pdf, rtol=1e-5)
     np.testing.assert_allclose(sample.weight, bsdf.total, rtol=1e-6)
-    along = np.abs(sample.wi[2]) if kind == "irradiance" else 1
-    np.testing.assert_allclose(f * np.abs(sample.wi[2]), np.broadcast_to(along, f.shape), rtol=1e-6)
+    assert (bsdf.f(wo, -sample.wi) == (kind == "fluence")).all()
 
 
 # --- Points on surfaces -------------------------------------------------------------------------------
@@ -157,6 +157,19 @@ def test_points_on_a_surface_see_the_side_of_their_normals(offset: float, accel:
     for normal in (turn[:, 2], -turn[:, 2]):
         found = wf.measure(scene, flat @ turn.T + offset, normal, spp=16, accel=accel, **QUIET)
         np.testing.assert_allclose(found.value, np.pi, rtol=1e-6)
+
+
+@pytest.mark.parametrize("accel", ["numpy", "auto"])
+def test_points_in_the_middle_of_a_large_surface_are_above_it(accel: str) -> None:
+    """There the corners of the surface are rounded by more than the points."""
+    rng = np.random.default_rng(7)
+    for turn in np.linalg.qr(rng.normal(size=(12, 3, 3)))[0]:
+        corner, edge_u, edge_v = turn @ (-1, -1, 0), 2 * turn[:, 0], 2 * turn[:, 1]
+        scene = wf.Scene(wf.Rectangle(corner, edge_u, edge_v, material=BLACK), wf.Environment(1))
+        points = np.concatenate([rng.uniform(-1e-3, 1e-3, (20, 2)), np.zeros((20, 1))], 1) @ turn.T
+        for side in (1, -1):
+            found = wf.measure(scene, points, side * turn[:, 2], spp=4, accel=accel, **QUIET)
+            np.testing.assert_allclose(found.value, np.pi, rtol=1e-6)
 
 
 def test_points_on_a_sphere_are_not_in_its_shadow() -> None:

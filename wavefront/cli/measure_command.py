@@ -95,5 +95,5 @@ def _save(found: Measurement, output: str) -> int:
         print_note(f"the measurement {f'was saved as {place}' if place else 'is lost'}")
         return ERROR
     seconds, spp = found.metadata["seconds"], found.metadata["spp"]
-    print_done(f"{output}: {found.summary()}, {spp:.4g} spp in {seconds:.1f} s")
+    print_done(f"{output}: {found}, {spp:.4g} spp in {seconds:.1f} s")
     return 0

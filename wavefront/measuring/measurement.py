@@ -9,11 +9,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..arrays.vec import Doubles
-from ..core.errors import SaveError, SceneError, number
+from ..core.errors import SaveError, SceneError
 from ..core.files import check_target, write_bytes
 from ..core.plural import plural
 from ..image import Image
-from ..statistics.student_t import t_quantile
+from ..statistics import RegionMean
 
 COLORS = ("r", "g", "b")
 
@@ -73,9 +73,9 @@ class Measurement:
 
     def __repr__(self) -> str:
         """Return the summary."""
-        return f"<Measurement: {self.summary()}>"
+        return f"<Measurement: {self}>"
 
-    def summary(self) -> str:
+    def __str__(self) -> str:
         """Return what was measured, at how many points, and the largest relative error."""
         places = plural(self._count, "point")
         return f"{self.kind} at {places}, estimated error {self.metadata['noise']:.2%} at most"
@@ -105,9 +105,9 @@ class Measurement:
         SceneError
             If the confidence is out of range.
         """
-        confidence = number("interval: confidence", confidence, lambda x: 0 < x < 1, "above 0 and below 1")
-        away = t_quantile(confidence, self._rows(self.image.freedom()))[:, None] * self.standard_error
-        return self.value - away, self.value + away
+        freedom = self._rows(self.image.freedom())[:, None]
+        value, error = (each.astype(np.float64) for each in (self.value, self.standard_error))
+        return RegionMean(value, error, freedom, self._count).interval(confidence)
 
     @property
     def direct(self) -> NDArray[np.float32]:

@@ -9,67 +9,65 @@ Source: M. Pharr, W. Jakob and G. Humphreys, Physically Based Rendering, 4th ed.
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from typing import TypeAlias
+
 import numpy as np
 
 from ..arrays.state import Hits, Paths, SurfaceInteraction
-from ..arrays.vec import INV_FOUR_PI, TINY, Floats, Lanes, broadcast, column, f4, highest
+from ..arrays.vec import Floats, Lanes, broadcast, column, f4, highest
 from ..bsdfs import Bsdf, BsdfSample
 from ..camera import Camera
 from ..compile.scene import CompiledScene
-from ..sampling.warp import cosine_hemisphere, cosine_hemisphere_pdf, uniform_sphere
+from ..sampling.warp import cosine_hemisphere, cosine_hemisphere_pdf, uniform_sphere, uniform_sphere_pdf
 from .interaction import POINT_ERROR, origin_above
 from .shade import Shading, receiver_of
 
+Warp: TypeAlias = Callable[[Floats], Floats]
 UP = column((0, 0, 1))
 
 
-class CosineReceiver(Bsdf):
-    """Gathers ∫ L cosθ dω over the hemisphere of the normal: irradiance."""
+class Receiver(Bsdf):
+    """Gathers light of the directions that a warp draws, by weights that are all the same.
+
+    Parameters
+    ----------
+    warp, density
+        From `sampling.warp`: its density is that of the light that counts.
+    total
+        The integral of the weights of all directions.
+    sphere
+        Whether all directions count alike: then there is no cosine, as within media.
+    """
 
     view_independent = True
-    total = f4(np.pi)  # the integral of the weight of a direction
+
+    def __init__(self, warp: Warp, density: Warp, total: float, sphere: bool) -> None:
+        self.warp, self.density, self.total, self.transmissive = warp, density, f4(total), sphere
 
     def f(self, wo: Floats, wi: Floats) -> Floats:
-        """Return 1 above the plane of the sensor, (3, n)."""
-        return np.broadcast_to((wi[2] > 0).astype(f4), wi.shape)
-
-    def sample_f(self, wo: Floats, u: Floats) -> BsdfSample:
-        """Draw cosine-weighted directions."""
-        wi = cosine_hemisphere(u)
-        weight = np.broadcast_to(self.total * (wi[2] > 0), wi.shape)
-        return BsdfSample(wi, weight, cosine_hemisphere_pdf(wi), broadcast(np.False_, wi.shape[1]))
-
-
-class SphereReceiver(Bsdf):
-    """Gathers ∫ L dω over all directions: fluence. `f` undoes the cosine that surfaces have."""
-
-    view_independent = True
-    transmissive = True
-    total = f4(4 * np.pi)
-
-    def f(self, wo: Floats, wi: Floats) -> Floats:
-        """Return 1/|cosθ|, (3, n)."""
-        return np.broadcast_to(f4(1) / np.maximum(np.abs(wi[2]), TINY), wi.shape)
+        """Return 1 where light counts, (3, n)."""
+        return np.broadcast_to((self.density(wi) > 0).astype(f4), wi.shape)
 
     def pdf(self, wo: Floats, wi: Floats) -> Floats:
-        """Return 1/(4π), (n,)."""
-        return broadcast(INV_FOUR_PI, wi.shape[1])
+        """Return the density of directions, (n,)."""
+        return self.density(wi)
 
     def sample_f(self, wo: Floats, u: Floats) -> BsdfSample:
-        """Draw directions that are evenly spread over the sphere."""
-        wi = uniform_sphere(u)
-        n = wi.shape[1]
-        weight = np.broadcast_to(self.total, wi.shape)
-        return BsdfSample(wi, weight, broadcast(INV_FOUR_PI, n), broadcast(np.False_, n))
+        """Draw directions by the warp."""
+        wi = self.warp(u)
+        pdf = self.density(wi)
+        weight = np.broadcast_to(self.total * (pdf > 0), wi.shape)
+        return BsdfSample(wi, weight, pdf, broadcast(np.False_, wi.shape[1]))
 
 
-RECEIVERS: dict[str, CosineReceiver | SphereReceiver] = {
-    "irradiance": CosineReceiver(),
-    "fluence": SphereReceiver(),
+RECEIVERS = {
+    "irradiance": Receiver(cosine_hemisphere, cosine_hemisphere_pdf, np.pi, sphere=False),  # ∫ L cosθ dω
+    "fluence": Receiver(uniform_sphere, uniform_sphere_pdf, 4 * np.pi, sphere=True),  # ∫ L dω
 }
 
 
-def receiver_of_camera(camera: Camera) -> CosineReceiver | SphereReceiver | None:
+def receiver_of_camera(camera: Camera) -> Receiver | None:
     """Return what the pixels of a camera gather light with; None where they show what rays meet."""
     return RECEIVERS[camera.sensor] if camera.scatterings and camera.sensor is not None else None
 
@@ -95,5 +93,7 @@ def sensor_shading(scene: CompiledScene, paths: Paths) -> Shading:
     )
     groups: list[tuple[Lanes, Bsdf]] = [(slice(0, n), paths.receiver)]
     receiver = receiver_of(surface, groups) if scene.lights.takes_receiver else None
-    up = np.broadcast_to(UP, normal.shape)
-    return Shading(surface, surface.frame(), up, origin_above(surface), groups, receiver=receiver)
+    up, volume = np.broadcast_to(UP, normal.shape), np.arange(n) if paths.receiver.transmissive else None
+    return Shading(
+        surface, surface.frame(), up, origin_above(surface), groups, receiver=receiver, volume=volume
+    )
