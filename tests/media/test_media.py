@@ -68,6 +68,17 @@ def test_lens_and_parallel_cameras_inside() -> None:
     assert seen.min() == pytest.approx(np.exp(-0.5), rel=0.01)
 
 
+def test_a_medium_that_glows_in_endless_fog() -> None:
+    """Rays without an end are in fog that does not glow."""
+    scene = wf.Scene(
+        ball(wf.Medium(1, emission=3)), camera=probe((0, 0, 0), (0, 0, 5)), medium=wf.Medium(0.1)
+    )
+    due = 3 * -np.expm1(-2) * np.exp(-0.4)
+    assert render(scene, 1, lighting=None).rgb == pytest.approx(due, rel=1e-5)
+    away = probe((0, 0, 9), (0, 0, 5))
+    assert not render(wf.Scene(scene.shapes, camera=away, medium=scene.medium), 1, lighting=None).rgb.any()
+
+
 def test_instances_hold_media() -> None:
     cube = block(wf.Medium(0.5, emission=1e-9))
     placed = [
@@ -340,11 +351,17 @@ def test_layers_of_fog() -> None:
 
 
 def test_light_groups_of_emission() -> None:
-    scene = wf.Scene(
-        ball(wf.Medium(1, 1, emission=2)), wf.PointLight((0, 3, 0), 1), probe((0, 0, 0), (0, 0, 5))
-    )
+    """It is in the default group, whatever the last light is in; the sum of all is the picture."""
+    sky = [wf.DirectionalLight((0, -1, 0), 1, group="sun"), wf.Environment(0.5, group="sky")]
+    glowing = ball(wf.Medium(1, 1, emission=2))
+    scene = wf.Scene(glowing, sky, probe((0, 0, 0), (0, 0, 5)))
+    layers = render(scene, 16, aovs=["light_groups"]).layers
+    alone = render(wf.Scene(glowing, camera=scene.camera), 16, aovs=["light_groups"], lighting=None)
+    assert layers["light_groups.default"] == pytest.approx(alone.rgb, rel=1e-5)
     image = render(scene, 16, aovs=["light_groups"])
-    assert image.layers["light_groups.default"] == pytest.approx(image.rgb, rel=1e-5)
+    assert sum(image.layers[f"light_groups.{name}"] for name in ("default", "sun", "sky")) == pytest.approx(
+        image.rgb, rel=1e-5
+    )
 
 
 def test_scenes_without_scattering_need_no_table() -> None:

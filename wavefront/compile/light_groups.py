@@ -8,7 +8,7 @@ import numpy as np
 
 from ..arrays.soa import soa
 from ..arrays.vec import Floats, Ints
-from ..film.aov_names import group_name
+from ..film.aov_names import DEFAULT_GROUP, group_name
 from ..lights import EnvironmentSum, InfiniteLight, Light, PatchedEnvironment, SkyPatches
 from ..shapes import CurvedShape, Mesh
 
@@ -28,6 +28,11 @@ class LightGroups:
     def need_directions(self) -> bool:
         """Whether the group of light depends on where it comes from."""
         return len(self.environment) > 1 or self.patches is not None
+
+    def with_media(self) -> LightGroups:
+        """Return the groups with light of media, number -1, in the default one."""
+        names = self.names if DEFAULT_GROUP in self.names else (*self.names, DEFAULT_GROUP)
+        return LightGroups(names, np.append(self.of_light, names.index(DEFAULT_GROUP)), self.environment)
 
     def parts_of_environment(self, wi: Floats) -> Iterator[tuple[str, Floats]]:
         """Yield each group of the environment, and its part (3, n) of the radiance from wi (3, n)."""

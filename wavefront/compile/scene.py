@@ -188,6 +188,7 @@ def compile_scene(
         light_of = np.append(light_of, np.full(len(phases), -1))
         has_alpha = np.append(has_alpha, np.zeros(len(phases), np.bool_))
         absorption = None
+        groups = groups.with_media() if media.glows else groups
     light_of = np.append(light_of, environment)
     return CompiledScene(
         scale=scale,

@@ -195,9 +195,9 @@ class HomogeneousMedia(MediumRecord):
         glow = take(self.glow, number)
         clear = extinction == 0
         depth = np.where(clear, f4(0), extinction * np.where(clear, f4(0), length))
-        thin = depth < THIN
-        series = f4(1) - depth * (f4(1 / 2) - depth * (f4(1 / 6) - depth * f4(1 / 24)))
-        part = np.where(thin, series * np.where(glow > 0, length, f4(0)), f4(0))
+        thin, low = depth < THIN, np.minimum(depth, THIN)
+        series = f4(1) - low * (f4(1 / 2) - low * (f4(1 / 6) - low * f4(1 / 24)))
+        part = series * np.where(thin & (glow > 0), length, f4(0))
         thick = (f4(1) - exp(-depth)) / np.where(clear, f4(1), extinction)
         return glow * np.where(thin, part, thick)
 
