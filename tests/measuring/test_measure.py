@@ -77,6 +77,24 @@ def test_a_furnace_is_as_bright_everywhere(kind: str, factor: float) -> None:
     assert_mean(found, factor / 0.4, 0.01)
 
 
+@pytest.mark.parametrize("integrator", INTEGRATOR_NAMES)
+@pytest.mark.parametrize(("kind", "factor"), [("irradiance", np.pi), ("fluence", 4 * np.pi)])
+def test_media_absorb_on_the_way_to_sensors(kind: str, factor: float, integrator: str) -> None:
+    wall = wf.Sphere((0, 0, 0), 2, material=BLACK, emission=1)
+    scene = wf.Scene([wall], medium=wf.Medium(absorption=0.5))
+    normal = (0, 0, 1) if kind == "irradiance" else None
+    found = mean(scene, (0, 0, 0), normal, 64, kind=kind, integrator=integrator)
+    assert_mean(found, factor * np.exp(-1), 1e-3)
+
+
+@pytest.mark.parametrize("integrator", ["full", "naive"])
+def test_fog_that_absorbs_nothing_leaves_a_furnace_as_it_is(integrator: str) -> None:
+    wall = wf.Sphere((0, 0, 0), 2, material=BLACK, emission=1)
+    scene = wf.Scene([wall], medium=wf.Medium(scattering=1.0))
+    found = mean(scene, (0.5, 0, 0), None, 64, kind="fluence", integrator=integrator, max_bounces=100)
+    assert_mean(found, 4 * np.pi, 0.01)
+
+
 def test_radiance_is_that_of_a_camera() -> None:
     box = scenes.cornell_box()
     found = mean(box, (0, 0, 3.9), (-0.2, -0.3, -3.9), 256, kind="radiance")
