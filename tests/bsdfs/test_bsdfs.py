@@ -88,9 +88,9 @@ EXAMPLES = {
         {"base_color": 1.0, "roughness": 0.3, "roughness_v": 0.6, "clearcoat": 0.5, "transmission": 0.5},
     ],
     Disney: [
-        {"base_color": (0.3, 0.2, 0.1)},
-        {"base_color": 0.2, "roughness": 0.3, "anisotropic": 0.8, "clearcoat": 1.0, "clearcoat_gloss": 0.1},
         {"base_color": (0.3, 0.2, 0.1), "metallic": 0.3, "transmission": 0.6, "specular_tint": 0.5},
+        {"base_color": 0.2, "roughness": 0.3, "anisotropic": 0.8, "clearcoat": 1.0, "clearcoat_gloss": 0.1},
+        {"base_color": (0.3, 0.2, 0.1)},
         {"base_color": (0.3, 0.2, 0.1), "flatness": 0.7, "sheen": 0.1, "sheen_tint": 0.5, "roughness": 0.9},
     ],
     ThinDisney: [

@@ -24,6 +24,8 @@ OPAQUE = wf.Disney(ior=1.3, **BASE, **COAT)
 CLEAR = wf.Disney(transmission=0.6, **BASE, **COAT)
 SHEET = wf.ThinDisney(ior=1.4, transmission=0.7, diffuse_transmission=1.2, **BASE)
 LOW = wf.ThinDisney(ior=0.8, transmission=0.7, diffuse_transmission=1.2, **BASE)
+BLACK = wf.Disney(ior=1.3, **BASE | COAT | {"base_color": 0, "clearcoat_gloss": 1})
+GLASSY = wf.Disney(transmission=1, **BASE, **COAT)
 VALUES = {  # f times the cosine
     "opaque": (
         OPAQUE,
@@ -82,6 +84,30 @@ VALUES = {  # f times the cosine
             (0.000223941, 0.000223941, 0.000223941),
             (7.17708, 5.34948, 2.39236),
             (0.0137172, 0.0102242, 0.00457241),
+            (0.0, 0.0, 0.0),
+        ],
+    ),
+    "glossy coat, black base": (
+        BLACK,
+        [
+            (0.0416815, 0.0416815, 0.0416815),
+            (0.139177, 0.139177, 0.139177),
+            (0.0823918, 0.0823918, 0.0823918),
+            (0.00036608, 0.00036608, 0.00036608),
+            (0.0, 0.0, 0.0),
+            (0.0, 0.0, 0.0),
+            (0.0, 0.0, 0.0),
+        ],
+    ),
+    "no diffuse base": (
+        GLASSY,
+        [
+            (0.637346, 0.380082, 0.122818),
+            (0.373298, 0.26651, 0.159723),
+            (0.0806486, 0.0712667, 0.0618847),
+            (0.00462219, 0.00288853, 0.00115487),
+            (0.244046, 0.181901, 0.0813486),
+            (0.0581188, 0.0433192, 0.0193729),
             (0.0, 0.0, 0.0),
         ],
     ),
