@@ -61,7 +61,7 @@ from .lights import (
 from .lights.choice import LightSampler
 from .material_ball import ball_png
 from .materials import Material
-from .media import HenyeyGreenstein, Isotropic, Medium, PhaseFunction, PhaseMix, Rayleigh
+from .media import GridMedium, HenyeyGreenstein, Isotropic, Medium, PhaseFunction, PhaseMix, Rayleigh
 from .render import render
 from .sampling import warp
 from .sampling.sampler import Sampler
@@ -75,6 +75,7 @@ from .shapes import (
     Cylinders,
     Disk,
     Edges,
+    GridBox,
     HeightField,
     Instance,
     Mesh,
@@ -167,6 +168,8 @@ __all__ = [
     "Environment",
     "Frame",
     "Geometry",
+    "GridBox",
+    "GridMedium",
     "HeightField",
     "HenyeyGreenstein",
     "IESLight",

@@ -12,9 +12,9 @@ import pytest
 
 import wavefront as wf
 from wavefront.codecs.images import write_image
+from wavefront.colors.spectrum import spectrum_rgb
 from wavefront.io.mitsuba import convert as _  # noqa: F401  fills the table
 from wavefront.io.mitsuba.nodes import PLUGINS, Node
-from wavefront.io.spectra import spectrum_rgb
 
 OBJ = "v 0 0 0\nv 1 0 0\nv 0 1 0\nvt 0 0\nvt 1 0\nvt 0 1\nf 1/1 2/2 3/3\n"
 PLY = """ply

@@ -20,6 +20,7 @@ from ..shapes import Shape
 from ..textures.base import BaseTexture
 
 DEPTH = 4  # media that a path remembers, the last one that it entered first
+NEAR = 1e-6  # part of a box that may overlap another one by rounding
 LOWEST = np.iinfo(np.intp).min  # priority of what is around all shapes
 ENTRY = np.int16  # small: every path carries four
 
@@ -162,7 +163,7 @@ def media_of(materials: Sequence[Material], around: BaseMedium | None) -> list[B
     """
     inside = [material.interior for material in materials if material.interior is not None]
     needed = around is not None or any(material.priority is not None for material in materials)
-    if not needed and not any(medium.scatters or medium.glows for medium in inside):
+    if not needed and not any(each.scatters or each.glows or each.bounds is not None for each in inside):
         return []
     return list({id(medium): medium for medium in [*inside, *([] if around is None else [around])]}.values())
 
@@ -196,6 +197,7 @@ def media_table(
     priorities = [each.priority for each in materials]
     if not media and all(each is None for each in priorities):
         return None
+    _check_apart(shapes)
     phases = list(dict.fromkeys(id(medium.phase) for medium in media if medium.scatters))
     entry_of, holders = np.zeros(len(materials) + len(phases), ENTRY), list[Material]()
     for row, material in enumerate(materials):
@@ -235,6 +237,28 @@ def media_table(
         if boxes
         else np.array([[np.inf] * 3, [-np.inf] * 3]),
     )
+
+
+def _check_apart(shapes: Sequence[Shape]) -> None:
+    """Refuse shapes of one priority whose media are different grids in boxes that overlap."""
+    placed = []
+    for shape in shapes:
+        medium = shape.material.interior
+        if medium is not None and medium.bounds is not None:
+            (low, high), (first, last) = shape.bounds, medium.bounds
+            placed.append((shape, medium, np.maximum(low, first), np.minimum(high, last)))
+    low, high = (np.array([each[side] for each in placed]).reshape(-1, 3) for side in (2, 3))
+    for number, (shape, medium, *_) in enumerate(placed):
+        shared = np.minimum(high, high[number]) - np.maximum(low, low[number])
+        for other in np.flatnonzero((shared > NEAR * (high[number] - low[number])).all(1)):
+            one, two = shape, placed[other][0]
+            if medium is not placed[other][1] and (one.material.priority or 0) == (
+                two.material.priority or 0
+            ):
+                raise SceneError(
+                    f"{one.name} and {two.name}: the grids of their media overlap; "
+                    "give one of the materials a higher priority"
+                )
 
 
 def _index(material: Material) -> float:

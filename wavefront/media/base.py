@@ -44,6 +44,11 @@ class BaseMedium(Parametrized, ABC):
     scatters: bool  # anywhere, in any channel
     glows: bool  # likewise for emission
 
+    @property
+    def bounds(self) -> NDArray[np.float64] | None:
+        """Corners of the box that it is in, (2, 3), scene units; here: None, as it may be anywhere."""
+        return None
+
     @abstractmethod
     def record(self, center: NDArray[np.float64]) -> MediumRecord:
         """Return the medium as a record of one column, with positions relative to `center` (3,)."""

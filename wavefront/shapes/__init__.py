@@ -2,7 +2,7 @@
 
 from .arrays import PrimitiveArray
 from .base import CurvedShape, Shape
-from .box import Box, Plane
+from .box import Box, GridBox, Plane
 from .disk import Disk
 from .height_field import HeightField
 from .instance import Instance
@@ -19,6 +19,7 @@ __all__ = [
     "Cylinders",
     "Disk",
     "Edges",
+    "GridBox",
     "HeightField",
     "Instance",
     "Mesh",

@@ -5,9 +5,11 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..core.errors import SceneError, finite_array, number
+from ..bsdfs import NullSurface
+from ..core.errors import SceneError, finite_array, in_brief, number
 from ..core.suggestions import suggests_keywords
-from ..materials import MaterialLike
+from ..materials import Material, MaterialLike
+from ..media import GridMedium
 from ..textures.parameter import Color
 from .mesh import Mesh, Rectangle
 
@@ -67,6 +69,34 @@ def Box(
         emission=emission,
         name=name,
     )
+
+
+@suggests_keywords
+def GridBox(medium: GridMedium, *, priority: int | None = None, name: str = "grid") -> Mesh:
+    """Return the box of a `GridMedium` as an invisible shape that holds the medium.
+
+    Parameters
+    ----------
+    medium
+        What is inside, and where.
+    priority, name
+        As for `Material` and `Mesh`.
+
+    Raises
+    ------
+    SceneError
+        If an argument is malformed.
+
+    Examples
+    --------
+    >>> smoke = wf.GridMedium(np.ones((4, 4, 4)), [(-1, 0, -1), (1, 2, 1)], absorption=2)
+    >>> wf.GridBox(smoke).bounds.tolist()
+    [[-1.0, 0.0, -1.0], [1.0, 2.0, 1.0]]
+    """
+    if not isinstance(medium, GridMedium):
+        raise SceneError(f"{name}: medium must be a GridMedium, got {in_brief(medium)}")
+    around = Material(NullSurface(), interior=medium, priority=priority)
+    return Box((0.5, 0.5, 0.5), 1, material=around, name=name).transformed(medium.transform)
 
 
 @suggests_keywords

@@ -15,11 +15,12 @@ from numpy.typing import NDArray
 from ...arrays.state import SurfaceInteraction
 from ...arrays.vec import Floats, luminance
 from ...colors import srgb_to_linear
+from ...colors.spectrum import blackbody, spectrum_rgb, uniform_emission
 from ...core.errors import SceneError, as_array, finite_array, in_brief, number
 from ...textures.base import BaseTexture
 from ...textures.image import Texture
 from ...textures.vertex_colors import VertexColors
-from ..spectra import blackbody, pairs_of, read_spectrum, spectrum_rgb, uniform_emission
+from ..spectra import pairs_of, read_spectrum
 from ..text_lines import numbers
 from .nodes import Job, Node, plugin, unsupported
 

@@ -11,13 +11,14 @@ import numpy as np
 
 from ...arrays.vec import Doubles, luminance
 from ...bsdfs import Diffuse
+from ...colors.spectrum import blackbody, spectrum_rgb
 from ...core.errors import SceneError, in_brief, number, one_of
 from ...core.suggestions import did_you_mean
 from ...materials import Material
 from ...shapes.transform import Matrix
 from ..repair import RawMesh, warn
 from ..sources import SceneFiles
-from ..spectra import METALS, blackbody, read_spectrum, spectrum_rgb
+from ..spectra import METALS, read_spectrum
 from .parser import NUMBERS, Parameter, placed
 
 NEUTRAL = ("stdillum-D65", "illum-acesD60")

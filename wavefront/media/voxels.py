@@ -1,0 +1,85 @@
+"""Grids of values between which is interpolated, and bounds of them on coarser grids."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any, Self
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..arrays.soa import soa
+from ..arrays.state import SoA
+from ..arrays.vec import Floats, Ints, f4, take
+
+MARGIN = 1e-3  # voxels by which bounds reach farther, for rounding
+
+
+@soa
+class Voxels(SoA):
+    """The values of k grids in the unit cube, trilinear between the centers of voxels and constant beyond.
+
+    Voxel (z, y, x) of (d, h, w) is centered at ((x + ½)/w, (y + ½)/h, (z + ½)/d).
+    """
+
+    values: Floats  # (c, m) of all grids, one after the other, x the fastest
+    first: Ints  # (k,) column of `values` where each grid begins
+    size: Ints  # (3, k) voxels along x, y and z
+
+    @classmethod
+    def of(cls, grid: Floats) -> Self:
+        """Return one grid (z, y, x) or (z, y, x, c)."""
+        depth, height, width = grid.shape[:3]
+        values = np.ascontiguousarray(grid.reshape(depth * height * width, -1).T)
+        return cls(values, np.zeros(1, np.intp), np.array([[width], [height], [depth]], np.intp))
+
+    @classmethod
+    def concatenate(cls, records: Sequence[Self]) -> Self:
+        """Return the grids of several records."""
+        ends = np.cumsum([0, *(each.values.shape[1] for each in records)])
+        first = [each.first + end for each, end in zip(records, ends[:-1], strict=True)]
+        parts = [np.concatenate([getattr(each, name) for each in records], -1) for name in ("values", "size")]
+        return cls(parts[0], np.concatenate(first), parts[1])
+
+    def at(self, number: Ints, point: Floats) -> Floats:
+        """Return the values (c, n) of grids (n,) at points (3, n) of the unit cube."""
+        if self.values.shape[1] == self.first.size:  # of one voxel each
+            return take(self.values, number)
+        size = take(self.size, number)
+        whole = size.astype(f4)
+        x = np.minimum(np.maximum(point * whole - f4(0.5), f4(0)), whole - f4(1))
+        low = x.astype(np.intp)
+        part = x - low
+        row, layer = size[0], size[0] * size[1]
+        corner = self.first.take(number) + low[0] + row * low[1] + layer * low[2]
+        inner = low + 1 < size  # at the last voxel there is no next one, and it has no part
+        along = inner[0], row * inner[1], layer * inner[2]
+        lines = []
+        for at in (corner, corner + along[1], corner + along[2], corner + along[1] + along[2]):
+            near = take(self.values, at)
+            lines.append(near + (take(self.values, at + along[0]) - near) * part[0])
+        near = lines[0] + (lines[1] - lines[0]) * part[1]
+        return near + (lines[2] + (lines[3] - lines[2]) * part[1] - near) * part[2]
+
+
+def bounds_in_cells(grid: NDArray[Any], cells: tuple[int, int, int], extreme: np.ufunc) -> NDArray[Any]:
+    """Return the greatest or least value (d, h, w) that interpolation reaches in each of a cube's cells.
+
+    Parameters
+    ----------
+    grid
+        (z, y, x).
+    cells
+        (d, h, w): along z, y and x.
+    extreme
+        `np.maximum` or `np.minimum`.
+    """
+    for axis, (count, size) in enumerate(zip(cells, grid.shape, strict=True)):
+        edges = np.arange(count + 1) * (size / count) - 0.5
+        first = np.clip(np.floor(edges[:-1] - MARGIN), 0, size - 1).astype(int)
+        last = np.clip(np.floor(edges[1:] + MARGIN) + 1, 0, size - 1).astype(int)
+        parts = [
+            extreme.reduce(grid.take(range(a, b + 1), axis), axis) for a, b in zip(first, last, strict=True)
+        ]
+        grid = np.stack(parts, axis)
+    return grid
