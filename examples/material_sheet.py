@@ -52,14 +52,14 @@ def glass() -> list[wf.Bsdf]:
 
 
 def coated() -> list[wf.Bsdf]:
-    """Return `Disney` from plastic to metal, `Principled` under ever more varnish and with more sheen."""
-    metallic = [wf.Disney(SKY, 0.3, metallic) for metallic in (0.0, 0.5, 1.0)]
+    """Return `Disney` as plastic, metal and a sheet, `Principled` under ever more varnish and with sheen."""
+    disney = [wf.Disney(SKY, 0.3, 0.0), wf.Disney(SKY, 0.3, 1.0), wf.ThinDisney(SKY, 0.3, transmission=0.5)]
     varnish = [wf.Principled(WINE, 0.6, 0.55, clearcoat=coat) for coat in (0.0, 0.5, 1.0)]
     velvet = [
         wf.Principled((0.05, 0.09, 0.06), 0, 0.9, sheen=sheen, sheen_color=(0.5, 0.9, 0.6))
         for sheen in (0.0, 0.5, 1.0)
     ]
-    return [*metallic, *varnish, *velvet]
+    return [*disney, *varnish, *velvet]
 
 
 def blended() -> list[wf.Bsdf]:

@@ -167,7 +167,7 @@ def test_copies_keep_their_parameters() -> None:
         (wf.Dielectric(1.5), "Dielectric(ior=1.5, roughness=0)"),
         (
             wf.Material(wf.Dielectric(), interior=wf.Medium((1, 0, 0))),
-            "Material(bsdf=Dielectric(ior=1.5, roughness=0), interior=Medium(absorption=(1, 0, 0)))",
+            "Material(bsdf=Dielectric(ior=1.5, roughness=0), interior=Medium(absorption=(1, 0, 0), scatt",
         ),
         (
             wf.Mix(wf.Mirror(), wf.Diffuse()),
