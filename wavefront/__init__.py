@@ -101,6 +101,7 @@ if TYPE_CHECKING:
     from .io.foreign import from_open3d, from_pyvista
     from .io.load import from_mitsuba, from_trimesh, load, load_mesh
     from .io.sources import LoadLimits
+    from .io.volumes import load_grid
     from .measuring import (
         DaylightCoefficients,
         Measurement,
@@ -127,6 +128,7 @@ _LATER = {  # what many programs do without is imported when they ask for it
     ".io.foreign": ("from_open3d", "from_pyvista"),
     ".io.load": ("from_mitsuba", "from_trimesh", "load", "load_mesh"),
     ".io.sources": ("LoadLimits",),
+    ".io.volumes": ("load_grid",),
     ".measuring": (
         "DaylightCoefficients",
         "Measurement",
@@ -239,6 +241,7 @@ __all__ = [
     "integrators",
     "interpolate_cameras",
     "load",
+    "load_grid",
     "load_mesh",
     "load_points",
     "load_weather",

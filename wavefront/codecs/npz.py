@@ -39,9 +39,19 @@ def decode(data: bytes, budget: Budget | None = None) -> ImageData:
     SceneError
         If the file is not an archive of numeric arrays, claims more than it can hold, or has no rgb.
     """
+    arrays = read_arrays(data, budget or Budget.of(data))
+    text = arrays.pop(METADATA, np.array("{}"))
+    if text.dtype.kind != "U" or text.ndim:
+        raise SceneError(f"the array {METADATA!r} is {text.dtype} of shape {text.shape}; it must be one text")
+    sums = {name: arrays.pop(name) for name in list(arrays) if name.startswith(SUMS)}
+    picture = from_named(arrays, from_json(str(text)))
+    return replace(picture, sums={name.removeprefix(SUMS): values for name, values in sums.items()})
+
+
+def read_arrays(data: bytes, budget: Budget) -> dict[str, NDArray[Any]]:
+    """Return the arrays of an npz file by their names; every header is checked before an array is read."""
     import zipfile
 
-    budget = budget or Budget.of(data)
     with zipfile.ZipFile(BytesIO(data)) as archive:
         members = {
             member.filename.removesuffix(".npy"): member for member in checked_members(archive, MAX_ARRAYS)
@@ -51,30 +61,35 @@ def decode(data: bytes, budget: Budget | None = None) -> ImageData:
             budget.check_size(*shapes["rgb"][:2])
         claimed = sum(member.file_size for member in members.values())
         budget.charge(f"the content of {plural(len(members), 'array')}", claimed)
-        arrays = {name: _read(archive, member) for name, member in members.items()}
-    text = arrays.pop(METADATA, np.array("{}"))
-    if text.dtype.kind != "U" or text.ndim:
-        raise SceneError(f"the array {METADATA!r} is {text.dtype} of shape {text.shape}; it must be one text")
-    sums = {name: arrays.pop(name) for name in list(arrays) if name.startswith(SUMS)}
-    picture = from_named(arrays, from_json(str(text)))
-    return replace(picture, sums={name.removeprefix(SUMS): values for name, values in sums.items()})
+        return {name: _read(archive, member) for name, member in members.items()}
 
 
 def _shape(archive: zipfile.ZipFile, member: zipfile.ZipInfo) -> tuple[int, ...]:
     """Return the shape of an array, after checking that its header claims what the archive holds."""
     with archive.open(member) as packed:
-        file = BytesIO(packed.read(MAX_HEADER))
-        major, _ = np.lib.format.read_magic(file)
-        header = {1: np.lib.format.read_array_header_1_0, 2: np.lib.format.read_array_header_2_0}.get(major)
-        if header is None:
-            raise SceneError(f"the array {member.filename!r} is of version {major} of npy; 1 and 2 are read")
-        shape, _, kind = header(file)
-        size = math.prod(shape) * kind.itemsize
-        if kind.kind not in KINDS or kind.hasobject or size != member.file_size - file.tell():
-            raise SceneError(
-                f"the array {member.filename!r} is {kind} of shape {shape}, in {member.file_size} bytes; "
-                "only numbers and text of their own size are read"
-            )
+        return checked_shape(member.filename, packed.read(MAX_HEADER), member.file_size)
+
+
+def checked_shape(name: str, start: bytes, there: int) -> tuple[int, ...]:
+    """Return the shape of an array in the format npy, given its first bytes and its size in bytes.
+
+    Raises
+    ------
+    SceneError
+        If its header claims another size, or it holds neither numbers nor text.
+    """
+    file = BytesIO(start)
+    major, _ = np.lib.format.read_magic(file)
+    header = {1: np.lib.format.read_array_header_1_0, 2: np.lib.format.read_array_header_2_0}.get(major)
+    if header is None:
+        raise SceneError(f"the array {name!r} is of version {major} of npy; 1 and 2 are read")
+    shape, _, kind = header(file)
+    size = math.prod(shape) * kind.itemsize
+    if kind.kind not in KINDS or kind.hasobject or size != there - file.tell():
+        raise SceneError(
+            f"the array {name!r} is {kind} of shape {shape}, in {there} bytes; "
+            "only numbers and text of their own size are read"
+        )
     return tuple(shape)
 
 
