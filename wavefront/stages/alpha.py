@@ -75,14 +75,14 @@ def alpha_pass_through(
             lanes, here, at = lanes.take(passing), here.take(passing), at.take(passing)
             surface = surface.take(passing)
         absorb(scene, here.throughput, at, surface)
-        here = replace(continue_behind(here, surface), media=cross(scene, here.media, surface))
+        here = continue_behind(here, surface)
         paths.origin[:, lanes], paths.exclude_prim[lanes] = here.origin, here.exclude_prim
         paths.throughput[:, lanes] = here.throughput
         hits.put(lanes, intersect(scene, here))
         if media is None:
             lanes = _passable(scene, paths, hits, lanes, catches)
         else:
-            paths.media[:, lanes] = here.media
+            paths.media[:, lanes] = cross(scene, here.media, surface)
     return paths, hits
 
 
