@@ -185,7 +185,7 @@ def compare(pairs: int = 10_000) -> list[Row]:
         rows += rough(mi, f"plastic {nonlinear:d}", ours, {"type": "plastic", **gray}, pairs, times=times)
         for distribution in ("ggx", "beckmann"):
             shape: dict[str, Any] = {"distribution": distribution, "shadowing": "separable"}
-            ours = Plastic((0.9, 0.5, 0.1), 0.6, nonlinear=nonlinear, **shape)
+            ours = Plastic((0.9, 0.5, 0.1), 0.6, nonlinear=nonlinear, multiscatter=False, **shape)
             theirs = {"type": "roughplastic", "distribution": distribution, "alpha": 0.36, **plastic}
             name = f"roughplastic {distribution} {nonlinear:d}"
             known = distribution == "ggx"

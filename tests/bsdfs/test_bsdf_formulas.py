@@ -289,7 +289,7 @@ def test_smooth_plastic(nonlinear):
 @pytest.mark.parametrize("distribution", ["ggx", "beckmann"])
 def test_boundary_of_rough_plastic(distribution):
     """What gets in, and what is reflected inside, are sums over samples of rough glass of that kind."""
-    from_outside, inside = boundary_tables(1.5, 0.5, distribution == "beckmann", False)
+    from_outside, inside = boundary_tables(1.5, 0.5, distribution == "beckmann", False, False)
     for k in (10, 40, 63):
         mu = k / 63
         u = np.random.default_rng(0).random((3, 200_000), dtype=F4)

@@ -299,6 +299,7 @@ RANDOM = {
         specular_reflectance=color(rng),
         nonlinear=rng.random() < 0.5,
         distribution=rng.choice(["ggx", "beckmann"]),
+        multiscatter=rng.random() < 0.5,
     ),
     ThinDielectric: lambda rng, roughness: ThinDielectric(
         index(rng), roughness, reflectance=color(rng), transmittance=color(rng)

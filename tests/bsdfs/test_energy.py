@@ -6,7 +6,7 @@ from scipy import stats
 from test_bsdfs import Constant, surface
 
 import wavefront as wf
-from wavefront.bsdfs import Bsdf, Conductor, Dielectric, Principled, ThinDielectric
+from wavefront.bsdfs import Bsdf, Conductor, Dielectric, Plastic, Principled, ThinDielectric
 from wavefront.bsdfs.energy import Shape, loss, mean_over_cosines, part_kept, scaling
 from wavefront.bsdfs.rough import RoughBsdf
 
@@ -42,6 +42,10 @@ WHITE = {
     "almost air": lambda rng, r: Dielectric(rng.uniform(1.002, 1.1), max(r, 0.2)),
     "brushed glass": lambda rng, r: Dielectric(1.5, r, roughness_v=max(0.2, r * rng.uniform(0.6, 1))),
     "glass by texture": lambda rng, r: Dielectric(1.5, Constant(r)),
+    "plastic": lambda rng, r: Plastic(1.0, r, rng.uniform(1.05, 2.4), nonlinear=rng.random() < 0.5),
+    "plastic of Beckmann": lambda rng, r: Plastic(1.0, r, distribution="beckmann"),
+    "plastic with separable shadowing": lambda rng, r: Plastic(1.0, r, shadowing="separable"),
+    "plastic by texture": lambda rng, r: Plastic(1.0, Constant(r)),
     "sheet": lambda rng, r: ThinDielectric(rng.uniform(1.1, 2.4), r),
     "principled metal": lambda rng, r: Principled(1.0, 1.0, r),
     "principled gloss": lambda rng, r: Principled(1.0, 0.0, r),
@@ -188,7 +192,7 @@ def test_glass_within_glass_is_without() -> None:
     np.testing.assert_array_equal(*both)
 
 
-@pytest.mark.parametrize("plugin", ["roughconductor", "roughdielectric"])
+@pytest.mark.parametrize("plugin", ["roughconductor", "roughdielectric", "roughplastic"])
 def test_scenes_of_mitsuba_scatter_once(plugin: str) -> None:
     ball = {"type": "sphere", "bsdf": {"type": plugin, "alpha": 0.5}}
     scene = wf.from_mitsuba({"type": "scene", "ball": ball})

@@ -299,7 +299,7 @@ GRAY = '"rgb reflectance" [ .5 .5 .5 ]'
         (
             'Material "coateddiffuse" "float eta" 1.7 "float roughness" .0625',
             wf.Plastic,
-            {"ior": 1.7, "roughness": 0.5},
+            {"ior": 1.7, "roughness": 0.5, "multiscatter": 0},
         ),
         (
             'Material "conductor"',

@@ -73,7 +73,11 @@ KINDS = {
     Dielectric: st.builds(Dielectric, index, reflectance=color, transmittance=color)
     | st.builds(Dielectric, index, rough, reflectance=color, transmittance=color, **facets),
     Plastic: st.builds(
-        Plastic, color, st.just(0.0) | st.just(0.5), distribution=st.sampled_from(["ggx", "beckmann"])
+        Plastic,
+        color,
+        st.just(0.0) | st.just(0.5),
+        distribution=st.sampled_from(["ggx", "beckmann"]),
+        multiscatter=st.booleans(),
     ),
     ThinDielectric: st.builds(
         ThinDielectric, index, st.just(0.0) | rough, reflectance=color, transmittance=color

@@ -190,9 +190,8 @@ def _facets(node: Node, job: Job) -> dict[str, Any]:
         "roughness": roughness(node, "alpha_u" if both else "alpha", 0.1, job),
         "distribution": node.choice("distribution", "beckmann", ("beckmann", "ggx")),
         "shadowing": "separable",
+        "multiscatter": False,
     }
-    if "plastic" not in node.plugin:
-        facets["multiscatter"] = False
     return facets | ({"roughness_v": roughness(node, "alpha_v", 0.1, job)} if both else {})
 
 

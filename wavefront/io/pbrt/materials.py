@@ -85,7 +85,7 @@ def _coated_diffuse(entity: Entity, job: Job) -> Material:
     base = _albedo(entity, "reflectance", 0.5, job)
     if thick:
         base = computed(_below_coat, base, *_coat(thick, ior))
-    return _made(entity, Plastic(base, ior=ior, nonlinear=True, **facets), job)
+    return _made(entity, Plastic(base, ior=ior, nonlinear=True, multiscatter=False, **facets), job)
 
 
 def _coat(thickness: float, ior: float) -> tuple[float, ...]:
