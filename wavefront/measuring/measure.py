@@ -45,7 +45,7 @@ def measure(
         As for `render`. Only its own light counts, unless `lighting` names a preset.
     points
         (n, 3) where the sensors are, scene units. A point on a surface is on the side that its normal points
-        to: sensors of irradiance are moved along their normals by about a millionth of the scene's size.
+        to: sensors of irradiance are moved along their normals by a four-millionth of the scene's size.
         Sensors cast no shadow.
     normals
         (n, 3), or (3,) for all points, of any length: the normals of the plane that irradiance falls on, or,
