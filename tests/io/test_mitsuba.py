@@ -651,6 +651,44 @@ def test_the_medium_around_all_shapes() -> None:
         scene(False, fog=fog, one=ball, two={"type": "cube", "exterior": {"type": "homogeneous"}})
 
 
+def test_media_on_grids(tmp_path: Path) -> None:
+    """Files of one and of three channels, constant ones, and where they are."""
+    grid = np.random.default_rng(1).random((4, 3, 2, 3)).astype("<f4")
+    header = struct.pack("<3sB5i6f", b"VOL", 3, 1, 2, 3, 4, 3, -1, -1, -1, 1, 3, 2)
+    (tmp_path / "color.vol").write_bytes(header + grid.tobytes())
+    header = header[:20] + struct.pack("<i", 1) + header[24:]
+    (tmp_path / "gray.vol").write_bytes(header + grid[..., 0].tobytes())
+    gray, color = (
+        {"type": "gridvolume", "filename": str(tmp_path / f"{each}.vol"), "use_grid_bbox": True}
+        for each in ("gray", "color")
+    )
+
+    def medium(**parameters: Any) -> Any:
+        return shape("cube", interior={"type": "heterogeneous", "scale": 2, **parameters}).material.interior
+
+    made = medium(sigma_t=gray, albedo=rgb(0.5, 1, 0), phase={"type": "hg", "g": 0.6})
+    assert made.bounds.tolist() == [[-1, -1, -1], [1, 3, 2]]
+    np.testing.assert_array_equal(made.density, grid[..., 0])
+    assert made.sigma_s.ravel() == pytest.approx([1, 2, 0])
+    assert made.sigma_a.ravel() == pytest.approx([1, 0, 2])
+    assert repr(made.phase) == repr(wf.HenyeyGreenstein(0.6))
+    np.testing.assert_array_equal(medium(sigma_t=color).density, grid)
+    np.testing.assert_array_equal(medium(sigma_t=gray, albedo=color).albedo, grid)
+    there = {**color, "use_grid_bbox": False}
+    np.testing.assert_allclose(medium(sigma_t=rgb(1, 2, 3), albedo=there).density, [[[[1, 2, 3]]]])
+    plain = medium(sigma_t={"type": "constvolume", "value": rgb(1, 2, 3)})
+    assert (plain.sigma_s + plain.sigma_a).ravel() == pytest.approx([2, 4, 6])
+    assert plain.bounds.tolist() == [[0, 0, 0], [1, 1, 1]]
+    ball = {"type": "sphere", "interior": {"type": "homogeneous", "sigma_t": gray}}
+    lost = {"sigma_t": {**gray, "filter_type": "nearest"}, "albedo": color}
+    for each, what in (
+        (ball, "sigma_t"),
+        ({**ball, "interior": {"type": "heterogeneous", **lost}}, "nearest"),
+    ):
+        with pytest.warns(UserWarning, match=what):
+            scene(False, ball=each)
+
+
 # --- What is not honored, and what is wrong -------------------------------------------------------
 
 

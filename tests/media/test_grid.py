@@ -110,6 +110,17 @@ def test_light_falls_through_noise_that_scatters(cells) -> None:
         assert_mean(mean, cos * np.exp(-sigma * depth), 0.03)
 
 
+def test_densities_of_channels() -> None:
+    """Each channel is as in a gray grid: of light that gets through, absorbed, and scattered once."""
+    grid, along = np.stack([noise() / 2, noise(seed=2) / 4, 0 * noise()], -1), np.array([0.3, -0.2, 1.0])
+    t = (along[:, None] * np.linspace(-1, 1, 100_001) + 1) / 2
+    depth = [density_at(grid[..., c], t).mean() * 2 * np.linalg.norm(along) for c in range(3)]
+    for more in ({"absorption": 0.8}, {"albedo": 0.5, "scale": 0.8}):
+        scene = in_box(wf.GridMedium(grid, BOX, **more), camera=probe((0, 0, 0), -3 * along))
+        for mean, each in zip(channels(scene, 256, max_bounces=0), depth, strict=True):
+            assert_mean(mean, np.exp(-0.8 * each), 0.03)
+
+
 # --- A uniform grid is a homogeneous medium --------------------------------------------------------------
 
 
@@ -165,6 +176,7 @@ def test_a_grid_of_albedos_is_a_color() -> None:
 
 WHITE = {
     "gray": lambda: wf.GridMedium(noise(), BOX, albedo=1),
+    "of channels": lambda: wf.GridMedium(np.stack([noise(seed=k) for k in range(3)], -1), BOX, albedo=1),
     "colored": lambda: wf.GridMedium(noise(), BOX, scattering=(0.5, 1, 2), phase=wf.HenyeyGreenstein(0.7)),
 }
 

@@ -49,7 +49,7 @@ def _colors_or(convert: Any, high: float = FLOAT32_MAX) -> Any:
     """Return the check of a parameter that is a color, or a grid (z, y, x, 3) of colors."""
 
     def check(name: str, value: Any) -> Any:
-        if not isinstance(value, str) and np.ndim(value) == 4:
+        if np.ndim(value) == 4:
             return _grid(name, value, (3,), high)
         return convert(name, value)
 
@@ -98,7 +98,7 @@ class GridMedium(BaseMedium):
     Parameters
     ----------
     density
-        (z, y, x), at least 0.
+        (z, y, x), at least 0; or (z, y, x, 3) for a density of each channel.
     transform
         Where the grid is, in the world: a matrix (4, 4) from the unit cube [0, 1]³, in which x is the last
         axis of the grid; or the lower and the upper corner of the box, (2, 3).
@@ -132,7 +132,7 @@ class GridMedium(BaseMedium):
     >>> scene = wf.Scene([wf.GridBox(puff)], wf.DirectionalLight((-1, -2, -1), 3))
     """
 
-    density = Parameter(_grid)
+    density = Parameter(_colors_or(_grid))
     transform = Parameter(_transform)
     absorption = Parameter(_coefficient)
     scattering = Parameter(_coefficient)
@@ -194,10 +194,11 @@ class GridMedium(BaseMedium):
 
     def _incandescence(self, absorbed: Doubles) -> Floats:
         """Return the emission (z, y, x, 3) of black bodies: absorption times their radiance."""
-        if self.temperature.shape != self.density.shape:
+        density = self.density if self.density.ndim == 4 else self.density[..., None]
+        if self.temperature.shape != density.shape[:3]:
             raise SceneError(
                 f"GridMedium temperature has shape {self.temperature.shape}; "
-                f"it must be that of the density, {self.density.shape}"
+                f"it must be that of the density, {density.shape[:3]}"
             )
         factor = 1.0 if self.emission is None else self.emission
         if np.ndim(factor) == 4:
@@ -205,7 +206,7 @@ class GridMedium(BaseMedium):
         absorption = absorbed[:, 0] * np.ravel(np.broadcast_to(factor, (3, 1))) * self.scale
         if self.albedo is not None and self.albedo.ndim == 4:
             raise SceneError("GridMedium albedo must be a color where there is a temperature")
-        radiance = blackbody_colors(self.temperature) * absorption * self.density[..., None]
+        radiance = blackbody_colors(self.temperature) * absorption * density
         return np.minimum(radiance, FLOAT32_MAX).astype(f4)
 
     @property
@@ -221,7 +222,7 @@ class GridMedium(BaseMedium):
         extinction = self.sigma_a + self.sigma_s
         albedo = self.albedo if self.albedo is not None and self.albedo.ndim == 4 else np.ones((1, 1, 1, 3))
         glow = np.zeros((1, 1, 1, 3)) if self.glow_grid is None else self.glow_grid
-        low, high = self._majorants(float(extinction.max()))
+        low, high = self._majorants(extinction)
         return GridMedia(
             density=Voxels.of(self.density),
             albedo=Voxels.of(albedo.astype(f4)),
@@ -244,10 +245,16 @@ class GridMedium(BaseMedium):
         other.scale = self.scale / factor
         return other
 
-    def _majorants(self, strongest: float) -> tuple[Doubles, Doubles]:
-        """Return the least and the greatest extinction (d, h, w) in the cells of a coarse grid."""
+    def _majorants(self, extinction: Floats) -> tuple[Doubles, Doubles]:
+        """Return the least and the greatest extinction (d, h, w) in the cells of a coarse grid.
+
+        The least is for the strongest channel, in proportion to the others; 0 where channels differ.
+        """
         edge = float(np.sqrt((self.transform[:3, :3] ** 2).sum(0)).mean())
-        sizes, best = np.array(self.density.shape), None
+        gray = self.density.ndim == 3
+        field = self.density if gray else (self.density * extinction[:, 0]).max(-1)
+        unit = float(extinction.max()) if gray else 1.0
+        sizes, best = np.array(field.shape), None
         longest = int(sizes.max())
         tried = [1, 4, 8, 16, 32, MOST_CELLS] if self.majorant_cells is None else [self.majorant_cells]
         for count in tried:
@@ -255,23 +262,18 @@ class GridMedium(BaseMedium):
                 break
             cells = tuple(int(each) for each in np.clip(np.rint(sizes * count / longest), 1, sizes))
             assert len(cells) == 3
-            low, high = (
-                bounds_in_cells(self.density, cells, extreme) * float(strongest)
-                for extreme in (np.minimum, np.maximum)
-            )
+            low, high = (bounds_in_cells(field, cells, each) * unit for each in (np.minimum, np.maximum))
             if self.glows:
-                shining = np.zeros(cells, np.bool_)
-                if self.glow_grid is not None:
-                    shining = bounds_in_cells(self.glow_grid.max(-1), cells, np.maximum) > 0
-                if self.glow.any():
-                    shining = shining | (bounds_in_cells(self.density, cells, np.maximum) > 0)
-                high = np.maximum(high, shining * (GLOW_EVENTS / edge))
+                shines: Any = 1.0
+                if not self.glow.any() and self.glow_grid is not None:
+                    shines = bounds_in_cells(self.glow_grid.max(-1), cells, np.maximum) > 0
+                high = np.maximum(high, GLOW_EVENTS / edge * shines)
             cost = sum(cells) / 3 + EVENT_COST * edge * float(high.mean())
             if best is None or cost < best[0]:
                 best = cost, low, high
         assert best is not None
         # bounds hold after rounding too
-        return best[1] * (1 - 1e-6), np.minimum(best[2] * (1 + 1e-6), FLOAT32_MAX)
+        return best[1] * (gray * (1 - 1e-6)), np.minimum(best[2] * (1 + 1e-6), FLOAT32_MAX)
 
 
 @soa

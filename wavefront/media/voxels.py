@@ -38,8 +38,10 @@ class Voxels(SoA):
         """Return the grids of several records."""
         ends = np.cumsum([0, *(each.values.shape[1] for each in records)])
         first = [each.first + end for each, end in zip(records, ends[:-1], strict=True)]
-        parts = [np.concatenate([getattr(each, name) for each in records], -1) for name in ("values", "size")]
-        return cls(parts[0], np.concatenate(first), parts[1])
+        channels = max(each.values.shape[0] for each in records)
+        values = [np.broadcast_to(each.values, (channels, each.values.shape[1])) for each in records]
+        size = np.concatenate([each.size for each in records], -1)
+        return cls(np.concatenate(values, -1), np.concatenate(first), size)
 
     def at(self, number: Ints, point: Floats) -> Floats:
         """Return the values (c, n) of grids (n,) at points (3, n) of the unit cube."""

@@ -22,7 +22,7 @@ from .textures import color
     "sample_emitters has_spectral_extinction",
 )
 def _homogeneous(node: Node, job: Job) -> Medium:
-    extinction, albedo = _coefficient(node, "sigma_t", 1.0, job), _coefficient(node, "albedo", 0.75, job)
+    extinction, albedo = coefficient(node, "sigma_t", 1.0, job), coefficient(node, "albedo", 0.75, job)
     scattering = extinction * albedo
     phase = phase_of(node, job)
     return Medium(extinction - scattering, scattering, phase=phase, scale=node.number("scale", 1.0))
@@ -34,11 +34,11 @@ def phase_of(node: Node, job: Job) -> PhaseFunction:
     return found[0] if found else Isotropic()
 
 
-def _coefficient(node: Node, name: str, default: float, job: Job) -> Doubles:
+def coefficient(node: Node, name: str, default: float, job: Job) -> Doubles:
     """Return a coefficient of each channel, (3,), given as a number, a color or a constant volume."""
     value = node.get(name, default)
     if isinstance(value, Node) and value.kind == "volume":
-        value = job.convert(value)
+        value = None if value.plugin == "gridvolume" else job.convert(value)
     else:
         value = color(node, name, default, job)
     if value is None or isinstance(value, BaseTexture):
@@ -47,7 +47,7 @@ def _coefficient(node: Node, name: str, default: float, job: Job) -> Doubles:
     return np.broadcast_to(np.asarray(value, np.float64), 3)
 
 
-@plugin("constvolume", "volume", "value", "texture", "to_world")
+@plugin("constvolume", "volume", "value to_world", "texture")
 def _constant_volume(node: Node, job: Job) -> Any:
     return color(node, "value", 1.0, job)
 
@@ -73,9 +73,7 @@ def _blend(node: Node, job: Job) -> PhaseFunction:
     return PhaseMix(first, second, node.number("weight", 0.5))
 
 
-unsupported("heterogeneous", "medium")
 unsupported("sggx tabphase", "phase")
-unsupported("gridvolume", "volume")
 
 
 def interior_of(node: Node, job: Job) -> BaseMedium | None:
