@@ -60,7 +60,7 @@ from .lights import (
 )
 from .lights.choice import LightSampler
 from .material_ball import ball_png
-from .materials import Material
+from .materials import Material, OpenPBR
 from .media import GridMedium, HenyeyGreenstein, Isotropic, Medium, PhaseFunction, PhaseMix, Rayleigh
 from .render import render
 from .sampling import warp
@@ -194,6 +194,7 @@ __all__ = [
     "Mix",
     "NormalMap",
     "NullSurface",
+    "OpenPBR",
     "OrenNayar",
     "PhaseFunction",
     "PhaseMix",

@@ -15,6 +15,7 @@ from wavefront.bsdfs import (
     Disney,
     Mirror,
     Mix,
+    OpenPBRBsdf,
     OrenNayar,
     Plastic,
     Principled,
@@ -339,6 +340,27 @@ RANDOM[Disney] = lambda rng, roughness: Disney(
     flatness=rng.random(),
     clearcoat=rng.choice([0, rng.random()]),
     clearcoat_gloss=0.5 * rng.random(),
+)
+RANDOM[OpenPBRBsdf] = lambda rng, roughness: OpenPBRBsdf(
+    base_weight=rng.random(),
+    base_color=color(rng),
+    base_diffuse_roughness=rng.choice([0, rng.random()]),
+    base_metalness=rng.choice([0, 1, rng.random()]),
+    specular_weight=rng.choice([1, rng.random()]),
+    specular_color=color(rng),
+    specular_roughness=roughness,
+    specular_ior=index(rng),
+    transmission_weight=rng.choice([0, 1, rng.random()]),
+    transmission_color=color(rng),
+    geometry_thin_walled=rng.random() < 0.3,
+    coat_weight=rng.choice([0, rng.random()]),
+    coat_color=color(rng),
+    coat_roughness=rng.choice([roughness, rng.random()]),
+    coat_ior=rng.uniform(1, 2),
+    fuzz_weight=rng.choice([0, rng.random()]),
+    fuzz_color=color(rng),
+    fuzz_roughness=rng.choice([roughness, rng.random()]),
+    thin_film_weight=rng.choice([0, 0, rng.random()]),
 )
 RANDOM[ThinDisney] = lambda rng, roughness: ThinDisney(
     0.5 * color(rng),  # it may reflect more light than arrives

@@ -15,6 +15,7 @@ from wavefront.bsdfs import (
     Disney,
     Mirror,
     Mix,
+    OpenPBRBsdf,
     OrenNayar,
     Plastic,
     Principled,
@@ -86,6 +87,17 @@ EXAMPLES = {
             "specular_color": (1, 0.9, 0.2),
         },
         {"base_color": 1.0, "roughness": 0.3, "roughness_v": 0.6, "clearcoat": 0.5, "transmission": 0.5},
+    ],
+    OpenPBRBsdf: [
+        {},
+        {"base_color": 1.0, "base_diffuse_roughness": 1.0, "specular_ior": 1.05, "subsurface_weight": 0.3},
+        {"base_metalness": 1.0, "specular_color": (0.5, 0.9, 0.2), "specular_weight": 0.7},
+        {"transmission_weight": 1.0, "transmission_color": (1, 0.5, 0.2), "specular_roughness": 0.5},
+        {"transmission_weight": 0.6, "geometry_thin_walled": True, "specular_ior": 1.0},
+        {"base_color": 1.0, "coat_weight": 0.8, "coat_color": (1, 0.5, 0), "coat_roughness": 0.3},
+        {"fuzz_weight": 0.7, "fuzz_color": (1, 0.5, 0.2), "coat_weight": 1.0, "base_metalness": 0.5},
+        {"thin_film_weight": 0.7, "base_metalness": 0.3, "transmission_weight": 0.4},
+        {"specular_roughness_anisotropy": 0.6, "specular_weight": 2.0, "coat_weight": 0.5},
     ],
     Disney: [
         {"base_color": (0.3, 0.2, 0.1), "metallic": 0.3, "transmission": 0.6, "specular_tint": 0.5},
@@ -215,7 +227,7 @@ def test_only_diffuse_is_matte():
 @pytest.mark.parametrize(("kind", "arguments"), CASES, ids=NAMES)
 def test_textures_of_one_value_equal_the_value(kind, arguments):
     """But for the light that is scattered more than once, whose tables for textures are interpolated."""
-    if kind in (Conductor, Dielectric, ThinDielectric, Principled):
+    if kind in (Conductor, Dielectric, ThinDielectric, Principled, OpenPBRBsdf):
         arguments = {**arguments, "multiscatter": False}
     plain = kind(**arguments)
     textured = kind(**{name: varying(plain, name, value) for name, value in arguments.items()})
@@ -318,6 +330,21 @@ BAD = {
             for name in ("base_color", "metallic", "transmission", "clearcoat", "clearcoat_roughness")
         },
         **{name: [-1] for name in ("roughness", "sheen", "sheen_roughness", "specular")},
+    },
+    OpenPBRBsdf: {
+        "specular_ior": [(0, "more than 0")],
+        "specular_weight": [(-1, "at least 0"), (np.inf, "at least 0")],
+        "coat_ior": [(0.9, "from 1 to 1e+06")],
+        "thin_film_thickness": [(101, "[0, 100] micrometers")],
+        **{name: [2] for name in ("base_weight", "base_color", "base_diffuse_roughness", "base_metalness")},
+        **{name: [-1] for name in ("specular_color", "specular_roughness", "transmission_weight")},
+        **{
+            name: [2] for name in ("specular_roughness_anisotropy", "transmission_color", "subsurface_weight")
+        },
+        **{name: [2] for name in ("subsurface_color", "coat_weight", "coat_color", "coat_roughness")},
+        **{name: [-1] for name in ("coat_darkening", "fuzz_weight", "fuzz_color", "fuzz_roughness")},
+        "thin_film_ior": [(0, "more than 0")],
+        "thin_film_weight": [2],
     },
     Disney: {
         "ior": [(0, "more than 0")],

@@ -22,6 +22,7 @@ from wavefront.bsdfs import (
     Disney,
     Mirror,
     Mix,
+    OpenPBRBsdf,
     OrenNayar,
     Plastic,
     Principled,
@@ -95,6 +96,20 @@ KINDS = {
         sheen=st.just(0.0) | part,
         specular=st.floats(0, 1),
     ),
+    OpenPBRBsdf: st.builds(
+        OpenPBRBsdf,
+        base_color=color,
+        base_diffuse_roughness=st.just(0.0) | part,
+        base_metalness=st.floats(0, 1),
+        specular_color=color,
+        specular_roughness=rough,
+        specular_ior=index,
+        transmission_weight=st.just(0.0) | st.floats(0, 1),
+        geometry_thin_walled=st.booleans(),
+        coat_weight=st.just(0.0) | part,
+        coat_roughness=rough,
+        fuzz_weight=st.just(0.0) | part,
+    ),
     Disney: st.builds(
         Disney, color, rough, part, anisotropic=part, ior=st.floats(1.1, 2), transmission=st.just(0.0) | part
     ),
@@ -147,6 +162,8 @@ def facets_of(bsdf: Bsdf) -> list[Facets]:
     """The facets of all lobes of a bound BSDF."""
     if isinstance(bsdf, Mix):
         return [*facets_of(bsdf.first), *facets_of(bsdf.second)]
+    if isinstance(bsdf, OpenPBRBsdf):
+        return facets_of(bsdf._layers)[: 1 + bsdf._layers._coated]
     found = [bsdf.facets()] if isinstance(bsdf, RoughBsdf) else []
     if isinstance(bsdf, ThinDisney):
         found.append(bsdf.facets_through())

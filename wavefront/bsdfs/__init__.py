@@ -9,6 +9,7 @@ from .disney_thin import ThinDisney
 from .mirror import Mirror
 from .mix import Mix
 from .null import NullSurface
+from .openpbr import OpenPBRBsdf
 from .oren_nayar import OrenNayar
 from .plastic import Plastic
 from .principled import Principled
@@ -25,6 +26,7 @@ ALL = (
     ThinDielectric,
     Plastic,
     Principled,
+    OpenPBRBsdf,
     Disney,
     ThinDisney,
     Mix,
@@ -42,6 +44,7 @@ __all__ = [
     "Mirror",
     "Mix",
     "NullSurface",
+    "OpenPBRBsdf",
     "OrenNayar",
     "Plastic",
     "Principled",

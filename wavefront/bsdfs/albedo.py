@@ -8,10 +8,12 @@ from functools import cache
 import numpy as np
 
 from ..arrays.vec import Bools, Floats, Ints, dot, f4
+from .fresnel import fresnel_dielectric
 from .microfacet import Facets, alpha_of, reflect
 
 SIZE = 32  # rows of roughness in [0, 1], and columns of the square root of the cosine in [0, 1]
 SIDE = 32  # a direction's integral takes SIDE² samples
+ROOTS = 0.6 * np.linspace(0, 1, 13) ** 2  # of the reflectance along the normal, in tables of dielectrics
 
 
 def lookup(table: Floats, roughness: Floats, cos: Floats) -> Floats:
@@ -58,17 +60,49 @@ def tabulate(row: Callable[[Floats, Floats, Floats], tuple[Floats, ...]]) -> tup
     return tuple(np.array(table, f4) for table in zip(*means, strict=True))
 
 
+def dielectric_albedo(ior: Floats, roughness: Floats, cos: Floats | None) -> Floats:
+    """Albedo of GGX with Fresnel's equations, (n,); its mean over cosines where `cos` is None.
+
+    The index is at least 1. Above 4 the albedo is that of 4.
+    """
+    root = np.sqrt((ior - f4(1)) / (ior + f4(1)) / f4(ROOTS[-1])) * f4(len(ROOTS) - 1)
+    root = np.minimum(root, f4(len(ROOTS) - 1.001))
+    level = root.astype(np.intp)
+    x = f4(0) if cos is None else np.sqrt(np.clip(cos, f4(0), f4(1)))
+    tables = _dielectric_tables()[int(cos is None)]
+    low, high = (interpolate(tables, roughness, np.asarray(x, f4), level + k) for k in (0, 1))
+    return low + (high - low) * (root - level.astype(f4))
+
+
+@cache
+def _dielectric_tables() -> tuple[Floats, Floats]:
+    """Albedos (ROOTS, SIZE, SIZE) of `dielectric_albedo`, and their cosine-weighted means."""
+    indices = [np.full(1, (1 + root) / (1 - root), f4) for root in ROOTS]
+
+    def row(wo: Floats, roughness: Floats, u: Floats) -> tuple[Floats, ...]:
+        m, shown = _reflected(wo, roughness, u)
+        return tuple(shown * fresnel_dielectric(np.minimum(dot(wo, m), f4(1)), eta)[0] for eta in indices)
+
+    tables = tabulate(row)
+    return np.stack(tables), np.stack([cosine_mean(table) for table in tables])
+
+
+def _reflected(wo: Floats, roughness: Floats, u: Floats) -> tuple[Floats, Floats]:
+    """Return microfacets (3, m) that wo sees, and G2/G1 of what they reflect, (m,)."""
+    facets = Facets(alpha_of(roughness))
+    m = facets.visible_normals(wo, u)
+    wi = reflect(wo, m)
+    zi = np.maximum(wi[2], f4(0))
+    so, si = facets.stretched(wo), facets.stretched(wi)
+    return m, zi * (wo[2] + so) / (wo[2] * si + zi * so)
+
+
 @cache
 def gloss_tables() -> tuple[Floats, Floats, Floats, Floats]:
     """Albedo of GGX with Schlick's Fresnel, as F0·A + F90·B: A, B, and their cosine-weighted means."""
 
     def row(wo: Floats, roughness: Floats, u: Floats) -> tuple[Floats, Floats]:
-        facets = Facets(alpha_of(roughness))
-        m = facets.visible_normals(wo, u)
-        wi = reflect(wo, m)
-        zi = np.maximum(wi[2], f4(0))
-        so, si = facets.stretched(wo), facets.stretched(wi)
-        shown = zi * (wo[2] + so) / (wo[2] * si + zi * so)  # G2/G1
+        m, shown = _reflected(wo, roughness, u)
         away = f4(1) - np.minimum(dot(wo, m), f4(1))
         weight = away * away * away * away * away
         return shown * (f4(1) - weight), shown * weight

@@ -247,16 +247,12 @@ class Principled(RoughBsdf):
         facets = self.facets()
         value, density, cos = facets.mirror_lobe(wo, wi)
         opaque = (f4(1) - self.metallic) * (f4(1) - self.transmission)
-        weight = _fifth(cos)
-        gloss = self._dielectric(weight)
         metal = self._metal(cos)
         if self._metal_again:
             metal = metal * gain(self, wo, wi, self._mean_metal())
-        if self.has_film:
-            gloss = self._gloss_with_film(cos)
+        gloss = self._gloss(cos)
         below = self._under_gloss(wo, wi) if self.conserve_energy else f4(1) - gloss.max(0)
-        diffuse = opaque * below * np.where(wi[2] > 0, INV_PI, f4(0))
-        f = (metal * self.metallic + gloss * opaque) * value + self.base_color * diffuse
+        f = (metal * self.metallic + gloss * opaque) * value + self._matte(wo, wi, opaque * below)
         pdf = chances.gloss * density + chances.diffuse * cosine_hemisphere_pdf(wi)
         if not self.transmissive:
             return f, pdf
@@ -267,12 +263,25 @@ class Principled(RoughBsdf):
         if self._sheet_again or self._clear_again:
             grown = gain(self, wo, wi)
             value, through = value * grown, through * grown if self.thin else through
-        once = value * reflected * clear + self.base_color * (through * clear)
+        once = value * reflected * clear + self._tint * (through * clear)
         if not self._clear_again:
             return f + once, pdf
         added, spread, _ = self._loss().lobe(self, wo, wi, self._inside)
-        tint = np.where(wi[2] < 0, self.base_color, f4(1))
+        tint = np.where(wi[2] < 0, self._tint, f4(1))
         return f + once + tint * (added * clear), pdf + chances.again * spread
+
+    @property
+    def _tint(self) -> Floats:
+        """Tint of the light that crosses the surface, (3, n)."""
+        return self.base_color
+
+    def _gloss(self, cos: Floats) -> Floats:
+        """Reflectance of the opaque dielectric, (3, n)."""
+        return self._gloss_with_film(cos) if self.has_film else self._dielectric(_fifth(cos))
+
+    def _matte(self, wo: Floats, wi: Floats, part: Floats) -> Floats:
+        """Value of the diffuse base (3, n) that is a part (n,) of the surface."""
+        return self.base_color * (part * np.where(wi[2] > 0, INV_PI, f4(0)))
 
     def _metal(self, cos: Floats) -> Floats:
         """Reflectance of the metal, (3, n), by Schlick's approximation or that of a film."""

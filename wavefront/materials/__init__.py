@@ -3,5 +3,6 @@
 from .alpha import Opacity
 from .material import Material, MaterialLike, as_material
 from .named import NAMED_MATERIALS
+from .openpbr import OpenPBR
 
-__all__ = ["NAMED_MATERIALS", "Material", "MaterialLike", "Opacity", "as_material"]
+__all__ = ["NAMED_MATERIALS", "Material", "MaterialLike", "Opacity", "OpenPBR", "as_material"]

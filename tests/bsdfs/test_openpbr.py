@@ -1,0 +1,184 @@
+"""OpenPBR by the equations of its specification."""
+
+import numpy as np
+import pytest
+
+from wavefront.bsdfs import OpenPBRBsdf, OrenNayar
+from wavefront.bsdfs.albedo import dielectric_albedo
+from wavefront.bsdfs.fresnel import fresnel_dielectric
+from wavefront.bsdfs.openpbr import weighted_index
+from wavefront.bsdfs.sheen import sheen_albedo, sheen_lobe
+from wavefront.bsdfs.thin_film import film_reflectance
+
+F4 = np.float32
+ANGLES = np.radians([0, 30, 60, 80])
+
+
+def pair(wo_z: float, wi_z: float, turn: float = np.pi) -> tuple[np.ndarray, np.ndarray]:
+    """Directions (3, 1) of cosines."""
+
+    def at(z: float, turn: float) -> np.ndarray:
+        r = np.sqrt(1 - z * z)
+        return np.array([[r * np.cos(turn)], [r * np.sin(turn)], [z]], F4)
+
+    return at(wo_z, 0), at(wi_z, turn)
+
+
+def mean_fresnel(ior: float) -> float:
+    mu = (np.arange(2000) + 0.5) / 2000
+    return float((2 * mu * fresnel_dielectric(mu, np.array([ior]))[0]).mean())
+
+
+def test_a_metal_is_tinted_at_82_degrees():
+    tint, f0 = np.array([[0.9], [0.5], [0.2]]), np.array([[0.8], [0.4], [0.3]])
+    metal = {"base_metalness": 1.0, "base_color": f0, "specular_roughness": 0.4, "multiscatter": False}
+    wo, wi = pair(1 / 7, 1 / 7)
+    plain, tinted = OpenPBRBsdf(**metal), OpenPBRBsdf(**metal, specular_color=tint)
+    assert tinted.f(wo, wi) / plain.f(wo, wi) == pytest.approx(tint, rel=1e-5)
+    up, also = pair(1, 1)
+    assert tinted.f(up, also) == pytest.approx(plain.f(up, also), rel=1e-5)
+    for z in (1.0, 0.5):
+        lobe = OpenPBRBsdf(**{**metal, "base_color": 1.0}).f(*pair(z, z))
+        schlick = f0 + (1 - f0) * (1 - z) ** 5
+        assert plain.f(*pair(z, z)) / lobe == pytest.approx(schlick, rel=1e-5)
+    dim = OpenPBRBsdf(**metal, specular_weight=0.3)
+    assert dim.f(wo, wi) == pytest.approx(0.3 * plain.f(wo, wi), rel=1e-5)
+
+
+def test_the_weight_scales_the_reflectance_along_the_normal():
+    for ior in (0.7, 1.2, 1.5, 2.4):
+        for weight in (0.0, 0.3, 1.0, 2.0):
+            bent = weighted_index(np.full(1, ior, F4), np.full(1, weight, F4))
+            expected = weight * ((ior - 1) / (ior + 1)) ** 2
+            assert ((bent - 1) / (bent + 1)) ** 2 == pytest.approx(expected, rel=1e-4, abs=1e-9)
+            assert (bent >= 1) == (ior >= 1 or weight == 0)
+
+
+def test_the_diffuse_base_is_eon():
+    color = np.array([[0.9], [0.5], [0.2]])
+    wo, wi = pair(0.6, 0.4, 0.3)
+    bare = {"base_color": color, "specular_weight": 0.0}
+    for weight in (1.0, 0.4):
+        f = OpenPBRBsdf(**bare, base_weight=weight, base_diffuse_roughness=0.7).f(wo, wi)
+        assert f == pytest.approx(OrenNayar(weight * color, 0.7, energy_preserving=True).f(wo, wi), rel=2e-4)
+    assert OpenPBRBsdf(**bare).f(wo, wi) == pytest.approx(color / np.pi, rel=2e-4)
+    below = OpenPBRBsdf(**bare, subsurface_weight=0.25, subsurface_color=(0.1, 0.2, 0.3)).f(wo, wi)
+    mixed = 0.75 * color + 0.25 * np.array([[0.1], [0.2], [0.3]])
+    assert below == pytest.approx(mixed / np.pi, rel=2e-4)
+
+
+@pytest.mark.parametrize("ior", [1.02, 1.5, 2.5])
+@pytest.mark.parametrize("roughness", [0.0, 0.5, 1.0])
+def test_a_white_base_reflects_all_light(ior, roughness):
+    bsdf = OpenPBRBsdf(base_color=1.0, specular_ior=ior, specular_roughness=roughness)
+    u = np.random.default_rng(0).random((3, 40_000), dtype=F4)
+    for angle in ANGLES:
+        wo = np.repeat(pair(np.cos(angle), 1)[0], u.shape[1], 1)
+        assert bsdf.sample_f(wo, u).weight.mean() == pytest.approx(1, abs=0.01)
+
+
+def test_anisotropy_keeps_the_mean_square_of_alpha():
+    for r, a in ((0.3, 0.0), (0.5, 0.6), (0.8, 0.95)):
+        facets = OpenPBRBsdf(specular_roughness=r, specular_roughness_anisotropy=a)._layers.facets()
+        across = facets.alpha if facets.alpha_v is None else facets.alpha_v
+        assert across / facets.alpha == pytest.approx(1 - a, rel=1e-5)
+        assert (across**2 + facets.alpha**2) / 2 == pytest.approx(r**4, rel=1e-5)
+
+
+def test_a_rough_coat_makes_the_base_rougher():
+    layers = OpenPBRBsdf(specular_roughness=0.3, coat_roughness=0.4, coat_weight=0.5)._layers
+    assert layers.roughness == pytest.approx(0.5 * (0.3 + (0.3**4 + 2 * 0.4**4) ** 0.25), rel=1e-5)
+    most = OpenPBRBsdf(specular_roughness=0.3, coat_roughness=1.0, coat_weight=1.0)._layers
+    assert most.roughness == pytest.approx(1)
+
+
+def test_layers_of_a_coat():
+    """The base under a coat, less the coat's own reflection: its losses, color and darkening."""
+    tint = np.array([[0.9], [0.5], [0.2]])
+    zo, zi, ior = 0.6, 0.8, 1.6
+    wo, wi = pair(zo, zi, 0.4)
+    coated = {"specular_weight": 0.0, "coat_weight": 1.0, "coat_roughness": 0.5, "coat_ior": ior}
+    gloss = OpenPBRBsdf(base_color=0.0, **coated).f(wo, wi)
+
+    def base(**given) -> np.ndarray:
+        return (OpenPBRBsdf(**coated, **given).f(wo, wi) - gloss) * np.pi
+
+    lost = max(float(dielectric_albedo(F4([ior]), F4([0.5]), F4([z]))[0]) for z in (zo, zi))
+    assert base(base_color=0.5, coat_darkening=0.0) == pytest.approx(0.5 * (1 - lost), rel=1e-3)
+    lengths = [1 / np.sqrt(1 - (1 - z * z) / ior**2) for z in (zo, zi)]
+    colored = base(base_color=0.5, coat_darkening=0.0, coat_color=tint)
+    assert colored == pytest.approx(0.5 * (1 - lost) * tint ** (sum(lengths) / 2), rel=1e-3)
+    back = 1 - (1 - mean_fresnel(ior)) / ior**2
+    dark = 0.5 * (1 - lost) * (1 - back) / (1 - 0.5 * back)
+    assert base(base_color=0.5) == pytest.approx(dark, rel=3e-3)
+    assert base(base_color=1.0) == pytest.approx(1 - lost, rel=1e-3)  # a white base has nothing to darken
+    half = base(base_color=0.5, coat_darkening=0.5)
+    assert half == pytest.approx((dark + 0.5 * (1 - lost)) / 2, rel=3e-3)
+
+
+def test_light_that_crosses_passes_a_coat_once():
+    tint, z = np.array([[0.9], [0.5], [0.2]]), 0.8
+    given = {"transmission_weight": 1.0, "specular_roughness": 0.4, "coat_weight": 1.0, "coat_darkening": 0.0}
+    wo, wi = pair(z, -z, 3)
+    plain, tinted = (OpenPBRBsdf(**given, coat_color=c).f(wo, wi) for c in (1.0, tint))
+    assert tinted / plain == pytest.approx(tint ** (0.5 / np.sqrt(1 - (1 - z * z) / 1.6**2)), rel=1e-4)
+
+
+def test_the_thickness_of_a_film_is_in_micrometers():
+    layers = OpenPBRBsdf(thin_film_weight=1.0, thin_film_thickness=0.4, base_color=0.5)._layers
+    film = film_reflectance(F4([0.7]), F4([400]), F4([1.4]), F4(1), F4([1.5]))
+    assert layers._gloss(F4([0.7])) == pytest.approx(film, rel=1e-3)
+
+
+def test_a_coat_reflects_by_its_index():
+    wo, wi = pair(0.7, 0.7)
+    bare = {"base_color": 0.0, "specular_weight": 0.0, "coat_roughness": 0.3, "coat_weight": 0.5}
+    metal = {"base_metalness": 1.0, "base_color": 1.0, "specular_roughness": 0.3, "multiscatter": False}
+    lobe = OpenPBRBsdf(**metal).f(wo, wi) / (1 + 0 * wo)
+    reflected = fresnel_dielectric(F4([0.7]), F4([1.8]))[0]
+    assert OpenPBRBsdf(**bare, coat_ior=1.8).f(wo, wi) == pytest.approx(0.5 * reflected * lobe, rel=1e-4)
+
+
+def test_the_gloss_below_a_coat_is_relative_to_its_index():
+    for ior, other in ((1.6 * 1.3, 1.3), (1.6 / 1.3, 1.3)):  # a denser coat reflects nothing totally
+        layers = OpenPBRBsdf(specular_ior=ior, coat_weight=1.0)._layers
+        expected = fresnel_dielectric(F4([0.7]), F4([other]))[0]
+        assert layers._gloss(F4([0.7]))[0] == pytest.approx(expected, rel=1e-4)
+
+
+def test_fuzz_lies_above_all():
+    zo, zi = 0.4, 0.8
+    wo, wi = pair(zo, zi, 0.4)
+    color = np.array([[0.9], [0.5], [0.2]])
+    f = OpenPBRBsdf(
+        base_color=0.5, specular_weight=0.0, fuzz_weight=0.6, fuzz_color=color, fuzz_roughness=0.7
+    ).f(wo, wi)
+    lost = 0.6 * max(float(sheen_albedo(F4([z]), F4([0.7]))[0]) for z in (zo, zi))
+    expected = 0.5 / np.pi * (1 - lost) + 0.6 * color * sheen_lobe(wo, wi, F4([0.7]))
+    assert f == pytest.approx(expected, rel=1e-3)
+
+
+@pytest.mark.parametrize(
+    "part", [{"base_metalness": 1.0}, {"transmission_weight": 1.0}, {"base_color": 0.0}], ids=str
+)
+def test_a_film_covers_a_part(part):
+    wo, wi = pair(0.7, 0.7, 3)
+    given = {"specular_roughness": 0.5, "multiscatter": False, "thin_film_thickness": 0.4, **part}
+    none, half, full = (OpenPBRBsdf(**given, thin_film_weight=w).f(wo, wi) for w in (0.0, 0.5, 1.0))
+    assert half == pytest.approx((none + full) / 2, rel=1e-4)
+    assert not np.allclose(none, full, rtol=0.02)
+
+
+def test_light_that_crosses_is_tinted():
+    tint = np.array([[0.9], [0.5], [0.2]])
+    for thin in (False, True):
+        given = {"transmission_weight": 1.0, "specular_roughness": 0.4, "geometry_thin_walled": thin}
+        wo, wi = pair(0.8, -0.8, 3)
+        plain, tinted = (OpenPBRBsdf(**given, transmission_color=c).f(wo, wi) for c in (1.0, tint))
+        assert (plain > 0).all()
+        assert tinted == pytest.approx(tint * plain, rel=1e-4)
+
+
+def test_unknown_parameters_are_refused():
+    with pytest.raises(TypeError, match="coat_wight"):
+        OpenPBRBsdf(coat_wight=1)

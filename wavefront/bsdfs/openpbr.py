@@ -1,0 +1,331 @@
+"""The scattering of OpenPBR: a coat and fuzz over metal, glossy diffuse and clear parts.
+
+Source: the OpenPBR Surface specification 1.1 (Academy Software Foundation, 2024). docs/openpbr.md lists what
+differs from it.
+"""
+
+from __future__ import annotations
+
+from copy import copy
+from functools import partial
+from typing import Any, Self
+
+import numpy as np
+
+from ..arrays.elementary import exp, log
+from ..arrays.state import SurfaceInteraction
+from ..arrays.vec import INV_PI, TINY, Floats, f4
+from ..core.parameter import Parameter
+from ..textures.base import BaseTexture
+from ..textures.parameter import color, refractive_index, scalar
+from .albedo import dielectric_albedo
+from .base import BsdfSample, JointBsdf
+from .energy import Shape, mean_over_cosines
+from .fresnel import fresnel_dielectric
+from .microfacet import Facets, alpha_of
+from .oren_nayar import OrenNayar
+from .principled import Principled
+from .rough import Tangent
+from .sheen import sheen_albedo
+
+F82 = f4(1 / 7)  # cosine of the angle where `specular_color` tints a metal, about 82°
+MICROMETERS = f4(1000)  # in nanometers
+LEAST_TINT = f4(1e-6)
+# names and defaults of the specification
+DEFAULTS: dict[str, Any] = {
+    "base_weight": 1.0,
+    "base_color": 0.8,
+    "base_diffuse_roughness": 0.0,
+    "base_metalness": 0.0,
+    "specular_weight": 1.0,
+    "specular_color": 1.0,
+    "specular_roughness": 0.3,
+    "specular_ior": 1.5,
+    "specular_roughness_anisotropy": 0.0,
+    "transmission_weight": 0.0,
+    "transmission_color": 1.0,
+    "subsurface_weight": 0.0,
+    "subsurface_color": 0.8,
+    "coat_weight": 0.0,
+    "coat_color": 1.0,
+    "coat_roughness": 0.0,
+    "coat_ior": 1.6,
+    "coat_darkening": 1.0,
+    "fuzz_weight": 0.0,
+    "fuzz_color": 1.0,
+    "fuzz_roughness": 0.5,
+    "thin_film_weight": 0.0,
+    "thin_film_thickness": 0.5,
+    "thin_film_ior": 1.4,
+    "geometry_thin_walled": False,
+    "multiscatter": True,
+}
+
+
+class OpenPBRBsdf(JointBsdf):
+    """The BSDF of `OpenPBR`, which describes the parameters.
+
+    Parameters
+    ----------
+    parameters
+        Those of `OpenPBR` that are about scattering, and `multiscatter`, as for `Principled`.
+
+    Raises
+    ------
+    SceneError
+        If a parameter is out of its range or not finite.
+    """
+
+    dimensions = 3
+    _layers: Layers
+
+    base_weight = Parameter(scalar)
+    base_color = Parameter(color)
+    base_diffuse_roughness = Parameter(scalar)
+    base_metalness = Parameter(scalar)
+    specular_weight = Parameter(partial(scalar, holds=lambda x: 0 <= x < np.inf, limit="at least 0"))
+    specular_color = Parameter(color)
+    specular_roughness = Parameter(scalar)
+    specular_ior = Parameter(refractive_index)
+    specular_roughness_anisotropy = Parameter(scalar)
+    transmission_weight = Parameter(scalar)
+    transmission_color = Parameter(color)
+    subsurface_weight = Parameter(scalar)
+    subsurface_color = Parameter(color)
+    coat_weight = Parameter(scalar)
+    coat_color = Parameter(color)
+    coat_roughness = Parameter(scalar)
+    coat_ior = Parameter(partial(scalar, holds=lambda x: 1 <= x <= 1e6, limit="from 1 to 1e+06"))
+    coat_darkening = Parameter(scalar)
+    fuzz_weight = Parameter(scalar)
+    fuzz_color = Parameter(color)
+    fuzz_roughness = Parameter(scalar)
+    thin_film_weight = Parameter(scalar)
+    thin_film_thickness = Parameter(
+        partial(scalar, holds=lambda x: 0 <= x <= 100, limit="in [0, 100] micrometers")
+    )
+    thin_film_ior = Parameter(refractive_index)
+    geometry_thin_walled = Parameter(lambda _, value: bool(value))
+    multiscatter = Parameter(lambda _, value: bool(value))
+
+    def __init__(self, **parameters: Any) -> None:
+        for name in parameters.keys() - DEFAULTS.keys():
+            raise TypeError(f"OpenPBRBsdf got an unexpected keyword argument {name!r}")
+        for name, default in DEFAULTS.items():
+            setattr(self, name, parameters.get(name, default))
+        self.derive()
+
+    @property
+    def thin(self) -> bool:
+        """True if the surface is a sheet."""
+        return self.geometry_thin_walled
+
+    def derive(self) -> None:
+        """Set which lobes exist, and the layers where all parameters are constants."""
+        used = {name for name, value in vars(self).items() if isinstance(value, BaseTexture) or np.any(value)}
+        textures = {name for name, value in vars(self).items() if isinstance(value, BaseTexture)}
+        self.transmissive = "transmission_weight" in used
+        layers = Layers(multiscatter=self.multiscatter, thin=self.thin)
+        layers.transmissive, layers._coated = self.transmissive, "coat_weight" in used
+        layers._cloth, layers.rough_base = "fuzz_weight" in used, "base_diffuse_roughness" in used
+        layers.has_film = {"thin_film_weight", "thin_film_thickness"} <= used
+        stretched = "specular_roughness_anisotropy" in used
+        layers.tangent = Tangent(np.zeros(1, f4)) if stretched else None
+        across = {"specular_roughness", "specular_roughness_anisotropy", "coat_roughness", "coat_weight"}
+        layers.shape = Shape(None, None, False, False)
+        if not textures & across:
+            along, beside = (float(alpha_of(r)[0]) for r in self._roughness())
+            layers.shape = Shape(along, beside if stretched else None, False, False)
+        again = self.multiscatter
+        layers._metal_again = again and "base_metalness" in used
+        layers._sheet_again = again and self.transmissive and self.thin
+        known = not (self.thin or layers.has_film or textures & {"specular_ior", "specular_weight"})
+        layers._clear_again = again and self.transmissive and known
+        self._layers = layers if textures else self._filled(layers)
+
+    def bind(self, surface: SurfaceInteraction) -> Self:
+        """Return the BSDF bound to `surface`, with the side of `wo`."""
+        bound = copy(super().bind(surface))
+        bound._layers = bound._filled(copy(self._layers).bind(surface))
+        return bound
+
+    def evaluate(self, wo: Floats, wi: Floats) -> tuple[Floats, Floats]:
+        """Return `f` and `pdf` of all lobes."""
+        return self._layers.evaluate(wo, wi)
+
+    def sample_f(self, wo: Floats, u: Floats) -> BsdfSample:
+        """Select a lobe by u[2], sample it, and weight by the density of all lobes."""
+        return self._layers.sample_f(wo, u)
+
+    def _roughness(self) -> tuple[Floats, Floats]:
+        """Roughness along and across the tangent, below the coat, (n,) each."""
+        below, above = (r * r * r * r for r in (self.specular_roughness, self.coat_roughness))
+        coated = np.sqrt(np.sqrt(np.minimum(below + f4(2) * above, f4(1))))
+        r = self.specular_roughness + (coated - self.specular_roughness) * self.coat_weight
+        aspect = f4(1) - self.specular_roughness_anisotropy
+        along = r * np.sqrt(np.sqrt(f4(2) / (f4(1) + aspect * aspect)))
+        return along, along * np.sqrt(aspect)
+
+    def _filled(self, layers: Layers) -> Layers:
+        """Return layers with the parameters at the points."""
+        along, across = self._roughness()
+        base = self.base_weight * self.base_color
+        around = f4(1) + (self.coat_ior - f4(1)) * self.coat_weight
+        below = weighted_index(self.specular_ior / around, self.specular_weight)
+        metal_weight = np.minimum(self.specular_weight, f4(1))
+        vars(layers).update(
+            roughness=along,
+            roughness_v=None if layers.tangent is None else across,
+            metallic=self.base_metalness,
+            transmission=self.transmission_weight,
+            ior=weighted_index(self.specular_ior, self.specular_weight),
+            index_below=np.maximum(below, f4(1) / below),
+            specular_weight=metal_weight,
+            specular_color=self.specular_color,
+            metal_color=base,
+            edge=f4(1) - self.specular_color,
+            base_color=base + (self.subsurface_color - base) * self.subsurface_weight,
+            diffuse=base * (f4(1) - self.subsurface_weight),
+            diffuse_roughness=self.base_diffuse_roughness,
+            subsurface=self.subsurface_color * self.subsurface_weight,
+            passed=self.transmission_color,
+            film_weight=self.thin_film_weight,
+            film_thickness=self.thin_film_thickness * MICROMETERS,
+            film_ior=self.thin_film_ior,
+            clearcoat=self.coat_weight,
+            clearcoat_roughness=self.coat_roughness,
+            coat_ior=self.coat_ior,
+            coat_color=self.coat_color,
+            darkening=self.coat_darkening * self.coat_weight,
+            sheen=self.fuzz_weight,
+            sheen_color=self.fuzz_color,
+            sheen_roughness=self.fuzz_roughness,
+        )
+        return layers
+
+
+class Layers(Principled):
+    """The layers of OpenPBR at the points of a wave. Its parameters are set by `OpenPBRBsdf`."""
+
+    rough_base: bool
+    index_below: Floats  # (n,) of the base relative to the coat, at least 1
+    metal_color: Floats  # (3, n) reflectance of the metal along the normal
+    edge: Floats  # (3, n) what a metal absorbs at `F82` beyond Schlick's approximation
+    diffuse: Floats  # (3, n)
+    diffuse_roughness: Floats  # (n,)
+    subsurface: Floats  # (3, n) scattered diffusely
+    passed: Floats  # (3, n)
+    film_weight: Floats  # (n,)
+    coat_ior: Floats  # (n,)
+    coat_color: Floats  # (3, n)
+    darkening: Floats  # (n,)
+
+    def evaluate(self, wo: Floats, wi: Floats) -> tuple[Floats, Floats]:
+        """Return `f` and `pdf` of all lobes: the base, then coat and fuzz layered over it."""
+        chances = self._chances(wo)
+        f, pdf = self._base(wo, wi, chances)
+        zo, zi = wo[2], np.abs(wi[2])
+        if self._coated:
+            value, density, cos = Facets(alpha_of(self.clearcoat_roughness)).mirror_lobe(wo, wi)
+            lost = np.maximum(
+                *(dielectric_albedo(self.coat_ior, self.clearcoat_roughness, z) for z in (zo, zi))
+            )
+            f = f * (f4(1) - self.clearcoat * lost) * self._absorbed(zo, zi, wi[2] < 0) * self._darkened()
+            f = f + value * self.clearcoat * fresnel_dielectric(cos, self.coat_ior)[0]
+            pdf = pdf + chances.coat * density
+        if self._cloth:
+            lost = np.maximum(*(sheen_albedo(z, self.sheen_roughness) for z in (zo, zi)))
+            f = f * (f4(1) - self.sheen * lost) + self._sheen(wo, wi)
+        return f, pdf
+
+    @property
+    def _tint(self) -> Floats:
+        return self.passed
+
+    def _dielectric(self, weight: Floats) -> Floats:
+        """About the reflectance of the opaque dielectric, (3, n), for the choice of lobes."""
+        root = (self.index_below - f4(1)) / (self.index_below + f4(1))
+        return self.specular_color * (root * root + (f4(1) - root * root) * weight)
+
+    def _gloss(self, cos: Floats) -> Floats:
+        plain, _ = fresnel_dielectric(cos, self.index_below)
+        if not self.has_film:
+            return self.specular_color * plain
+        root = (self.index_below - f4(1)) / (self.index_below + f4(1))
+        film = self._film(cos, np.broadcast_to(root * root, cos.shape))
+        return self.specular_color * (plain + (film - plain) * self.film_weight)
+
+    def _matte(self, wo: Floats, wi: Floats, part: Floats) -> Floats:
+        above = part * np.where(wi[2] > 0, INV_PI, f4(0))
+        if not self.rough_base:
+            return self.base_color * above
+        rough = copy(ROUGH)
+        vars(rough).update(reflectance=self.diffuse, sigma=self.diffuse_roughness)
+        return rough.f(wo, wi) * part + self.subsurface * above
+
+    def _under_gloss(self, wo: Floats, wi: Floats) -> Floats:
+        """Part of the light that reaches the diffuse base and leaves it again, as in `Principled`, (n,)."""
+        if self.has_film:
+            passed = [f4(1) - self._gloss(np.abs(w[2])).max(0) for w in (wo, wi)]
+            return passed[0] * passed[1]
+        roughness, tint = self.mean_roughness(), self.specular_color.max(0)
+        one, other, mean = (
+            f4(1) - tint * dielectric_albedo(self.index_below, roughness, cos)
+            for cos in (wo[2], np.abs(wi[2]), None)
+        )
+        return one * other / mean
+
+    def _metal(self, cos: Floats) -> Floats:
+        """Reflectance of the metal, (3, n), by the F82 tint (specification, section on metal)."""
+        f0, away = self.metal_color, np.maximum(f4(1) - cos, f4(0))
+        fifth = (away * away) * (away * away) * away
+        steep = (f4(1) - F82) ** 5
+        dip = (f0 + (f4(1) - f0) * steep) * self.edge / (F82 * steep * (f4(1) - F82))
+        plain = f0 + (f4(1) - f0) * fifth - dip * (cos * fifth * away)
+        if self.has_film:
+            plain = plain + (self._film(cos, f0) - plain) * self.film_weight
+        return np.maximum(plain, f4(0)) * self.specular_weight
+
+    def _mean_metal(self) -> Floats:
+        return mean_over_cosines(self._metal)
+
+    def _fresnel(self, cos: Floats) -> tuple[Floats, Floats]:
+        face, refracted = super()._fresnel(cos)
+        if self.has_film:
+            bare = copy(self)
+            bare.has_film = False
+            plain, _ = bare._fresnel(cos)
+            face = plain + (face - plain) * self.film_weight
+        return face, refracted
+
+    def _absorbed(self, zo: Floats, zi: Floats, crosses: Any) -> Floats:
+        """Light that the coat lets pass, (3, n): `coat_color` where it is passed twice along the normal."""
+        sin2 = f4(1) / (self.coat_ior * self.coat_ior)
+        lengths = (f4(1) / np.sqrt(np.maximum(f4(1) - (f4(1) - z * z) * sin2, TINY)) for z in (zo, zi))
+        part = sum(lengths, f4(0)) * np.where(crosses, f4(0.25), f4(0.5))
+        color = exp(log(np.maximum(self.coat_color, LEAST_TINT)) * part)
+        return f4(1) + (color - f4(1)) * self.clearcoat
+
+    def _darkened(self) -> Floats:
+        """Part that is left of light that the coat threw back to the base, (3, n) (specification, Δ)."""
+        outside, below = (
+            mean_over_cosines(lambda mu, eta=eta: fresnel_dielectric(mu, eta)[0])  # type: ignore[misc]
+            for eta in (self.coat_ior, self.index_below)
+        )
+        inside = f4(1) - (f4(1) - outside) / (self.coat_ior * self.coat_ior)
+        m, opaque = self.metallic, f4(1) - self.transmission
+        rough = f4(1) + (self.roughness - f4(1)) * (below + (f4(1) - below) * m)
+        back = outside + (inside - outside) * rough
+        base = opaque * (self.base_color + (f4(1) - self.base_color) * below) + self.transmission
+        albedo = base + (self._mean_metal() - base) * m
+        return f4(1) + ((f4(1) - back) / (f4(1) - albedo * back) - f4(1)) * self.darkening
+
+
+def weighted_index(ior: Floats, weight: Floats) -> Floats:
+    """Return the index whose reflectance along the normal is `weight` times that of another, (n,)."""
+    root = (ior - f4(1)) / (ior + f4(1)) * np.sqrt(weight)
+    root = np.clip(root, f4(-0.999), f4(0.999))
+    return (f4(1) + root) / (f4(1) - root)
+
+
+ROUGH = OrenNayar(0.5, 0.5, energy_preserving=True)

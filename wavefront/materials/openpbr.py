@@ -1,0 +1,177 @@
+"""OpenPBR, the material that Blender, Houdini and Maya agree on."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from ..arrays.state import SurfaceInteraction
+from ..arrays.vec import Floats, f4
+from ..bsdfs.openpbr import DEFAULTS, OpenPBRBsdf
+from ..colors import rgb
+from ..core.errors import SceneError, number, warn_caller
+from ..core.suggestions import suggests_keywords
+from ..media import HenyeyGreenstein, Medium
+from ..textures.base import BaseTexture
+from ..textures.normal_map import BaseNormalMap
+from ..textures.parameter import Color, Scalar, color
+from .material import Material
+
+LEAST_COLOR = f4(1e-4)  # of what passes `transmission_depth`
+
+
+class OpenPBR(Material):
+    """The material of OpenPBR 1.1, with the names, units and defaults of its specification.
+
+    The `bsdf` scatters light, and the emission, alpha, normal map and interior follow from the other
+    parameters. docs/openpbr.md lists what is approximated.
+
+    Parameters
+    ----------
+    base_weight, base_color, base_diffuse_roughness, base_metalness
+        The diffuse base or the metal: its color times its weight, the roughness of the diffuse base (the EON
+        model), and from 0 (dielectric) to 1 (metal). All in [0, 1].
+    specular_weight, specular_color, specular_roughness, specular_roughness_anisotropy, specular_ior
+        The reflection of the base: the weight, at least 0, scales the reflectance along the normal by way of
+        the index; the color tints it, for metals at about 82°.
+    transmission_weight, transmission_color, transmission_depth
+        Part of the dielectric that is clear. The color tints light where it crosses the surface, or where the
+        depth is more than 0, on a path of this length inside.
+    transmission_scatter, transmission_scatter_anisotropy
+        Scattering inside, 1/`transmission_depth`, and its mean cosine in (−1, 1).
+    subsurface_weight, subsurface_color
+        Part of the base that scatters light below the surface, as if it were diffuse.
+    coat_weight, coat_color, coat_roughness, coat_ior, coat_darkening
+        A clear coat, what it lets pass along the normal in and out, and how much light that it throws back
+        to the base darkens it.
+    fuzz_weight, fuzz_color, fuzz_roughness
+        Fibers above all.
+    emission_luminance, emission_color
+        Their product is the radiance.
+    thin_film_weight, thin_film_thickness, thin_film_ior
+        A film on the base, in micrometers.
+    geometry_opacity
+        In [0, 1].
+    geometry_thin_walled
+        The surface is a sheet.
+    geometry_normal
+        A `NormalMap` or `BumpMap`.
+    name
+        As for `Material`.
+
+    Raises
+    ------
+    SceneError
+        If a parameter is out of its range, not finite, or a texture where there can be none.
+
+    Examples
+    --------
+    >>> paint = wf.OpenPBR(base_color=(0.6, 0.05, 0.05), specular_roughness=0.4, coat_weight=1)
+    >>> honey = wf.OpenPBR(transmission_weight=1, transmission_color=(1, 0.6, 0.1), transmission_depth=0.5)
+    """
+
+    @suggests_keywords
+    def __init__(
+        self,
+        *,
+        base_weight: Scalar = 1.0,
+        base_color: Color = 0.8,
+        base_diffuse_roughness: Scalar = 0.0,
+        base_metalness: Scalar = 0.0,
+        specular_weight: Scalar = 1.0,
+        specular_color: Color = 1.0,
+        specular_roughness: Scalar = 0.3,
+        specular_ior: Scalar = 1.5,
+        specular_roughness_anisotropy: Scalar = 0.0,
+        transmission_weight: Scalar = 0.0,
+        transmission_color: Color = 1.0,
+        transmission_depth: float = 0.0,
+        transmission_scatter: ArrayLike = 0.0,
+        transmission_scatter_anisotropy: float = 0.0,
+        subsurface_weight: Scalar = 0.0,
+        subsurface_color: Color = 0.8,
+        coat_weight: Scalar = 0.0,
+        coat_color: Color = 1.0,
+        coat_roughness: Scalar = 0.0,
+        coat_ior: Scalar = 1.6,
+        coat_darkening: Scalar = 1.0,
+        fuzz_weight: Scalar = 0.0,
+        fuzz_color: Color = 1.0,
+        fuzz_roughness: Scalar = 0.5,
+        thin_film_weight: Scalar = 0.0,
+        thin_film_thickness: Scalar = 0.5,
+        thin_film_ior: Scalar = 1.4,
+        emission_luminance: float = 0.0,
+        emission_color: Color = 1.0,
+        geometry_opacity: Scalar = 1.0,
+        geometry_thin_walled: bool = False,
+        geometry_normal: BaseNormalMap | None = None,
+        name: str | None = None,
+    ) -> None:
+        given = locals()
+        depth = number(
+            "OpenPBR transmission_depth", transmission_depth, lambda x: 0 <= x < np.inf, "at least 0"
+        )
+        interior = None
+        if depth > 0 and not geometry_thin_walled:
+            given["transmission_color"] = 1.0
+            interior = _interior(
+                transmission_color, depth, transmission_scatter, transmission_scatter_anisotropy
+            )
+        luminance = number(
+            "OpenPBR emission_luminance", emission_luminance, lambda x: 0 <= x < np.inf, "at least 0"
+        )
+        if isinstance(subsurface_weight, BaseTexture) or subsurface_weight > 0:
+            warn_caller("OpenPBR: subsurface scattering is approximated by a diffuse surface of its color")
+        super().__init__(
+            OpenPBRBsdf(**{key: given[key] for key in DEFAULTS if key in given}),
+            alpha=geometry_opacity
+            if isinstance(geometry_opacity, BaseTexture) or geometry_opacity != 1
+            else None,
+            normal_map=geometry_normal,
+            emission=_emission(_amount("emission_luminance", emission_luminance), emission_color),
+            interior=interior,
+            name=name,
+        )
+
+
+def _amount(name: str, value: float) -> float:
+    return number(f"OpenPBR {name}", value, lambda x: 0 <= x < np.inf, "at least 0 and finite")
+
+
+def _emission(luminance: float, tint: Color) -> Color | None:
+    if luminance == 0:
+        return None
+    if isinstance(tint, BaseTexture):
+        return Scaled(tint, luminance)
+    return color("OpenPBR emission_color", tint, np.inf) * f4(luminance)
+
+
+def _interior(passed: Color, depth: float, scatter: ArrayLike, anisotropy: float) -> Medium:
+    """Return the medium that lets a color pass a depth (specification, section on translucency)."""
+    if isinstance(passed, BaseTexture):
+        raise SceneError("OpenPBR transmission_color is a texture; with a transmission_depth it is a color")
+    tint = np.maximum(color("OpenPBR transmission_color", passed), LEAST_COLOR)
+    scattering = rgb("OpenPBR transmission_scatter", scatter, np.inf) / f4(depth)
+    absorption = -np.log(tint.astype(float)) / depth - scattering
+    absorption -= min(float(absorption.min()), 0)  # as much as makes all channels absorb
+    phase = HenyeyGreenstein(anisotropy) if anisotropy else None
+    return Medium(absorption[:, 0], scattering[:, 0], phase=phase)
+
+
+class Scaled(BaseTexture):
+    """A texture of colors times a number."""
+
+    scalar = False
+
+    def __init__(self, colors: BaseTexture, factor: float) -> None:
+        self.colors, self.factor = colors, f4(factor)
+        self.reads = colors.reads
+
+    def limits(self) -> tuple[float, ...]:
+        """Return the limits of the products."""
+        return tuple(limit * float(self.factor) for limit in self.colors.limits())
+
+    def at(self, surface: SurfaceInteraction) -> Floats:
+        """Return the products, (3, n)."""
+        return np.broadcast_to(self.colors.at(surface) * self.factor, (3, len(surface)))
