@@ -404,6 +404,19 @@ def test_media_fill_shapes_and_space(tmp_path: Path) -> None:
     assert scene.medium is not None
     assert rows(scene.medium.sigma_s) == [1, 1, 1]  # type: ignore[attr-defined]
     assert [each.material.interior is None for each in scene.shapes] == [True, False]
+    numbers = " ".join(map(str, range(6)))
+    smoke = f"""MakeNamedMedium "s" "string type" "uniformgrid" "integer nx" 3 "integer nz" 2 "float density"
+    [ {numbers} ] "rgb sigma_a" [ 1 2 3 ] "float scale" 2 "point3 p1" [ 3 4 5 ] "point3 p0" [ 1 2 3 ]"""
+    use = f'MediumInterface "s" "" Material "interface" {BALL}'
+    glow = '"rgb Le" [ 1 1 2 ] "float Lescale"'
+    grid = shape(tmp_path, f"Translate 0 0 1 {smoke} {use}").material.interior
+    assert grid.density.tolist() == [[[0, 1, 2]], [[3, 4, 5]]]
+    assert grid.bounds.tolist() == [[1, 2, 4], [3, 4, 6]]
+    assert (rows(grid.sigma_a), rows(grid.sigma_s)) == ([2, 4, 6], [2, 2, 2])
+    grid = shape(tmp_path, f"{smoke} {glow} [ {numbers} ] {use}").material.interior
+    assert grid.glow_grid[1, 0, 2].tolist() == [2 * 25 * each for each in (1, 2, 6)]
+    with pytest.raises(wf.SceneError, match="Lescale has 1 numbers; nx, ny and nz make 6"):
+        load(tmp_path, f"{smoke} {glow} 1 {use}")
     same = shape(tmp_path, f'{tea} MediumInterface "tea" {BALL}')  # the same on both sides
     assert same.material.interior is None
 

@@ -13,7 +13,7 @@ from ...bsdfs import Conductor, Dielectric, Diffuse, Mix, NullSurface, Plastic, 
 from ...bsdfs.fresnel import fresnel_dielectric
 from ...core.errors import SceneError, number
 from ...materials import Material
-from ...media import HenyeyGreenstein, Medium
+from ...media import GridMedium, HenyeyGreenstein, Medium
 from ...textures.base import BaseTexture
 from ...textures.image import Texture
 from ...textures.normal_map import BumpMap, NormalMap
@@ -219,7 +219,42 @@ def _homogeneous(entity: Entity, job: Job) -> Medium | None:
     )
 
 
-unsupported("medium", "uniformgrid rgbgrid cloud nanovdb")
+@converts("medium", "uniformgrid")
+def _grid(entity: Entity, job: Job) -> GridMedium:
+    size = tuple(entity.whole(name, 1, 1) for name in ("nz", "ny", "nx"))
+    density = _voxels(entity, "density", size)
+    if density is None:
+        raise SceneError("has no density")
+    absorbed, scattered = (entity.spectrum(name, 1.0, job, "unbounded") for name in ("sigma_a", "sigma_s"))
+    glow = entity.spectrum("Le", 0.0, job, "light") * job.exposure * absorbed
+    factor = _voxels(entity, "Lescale", size)
+    if factor is not None:
+        glow = (density * factor)[..., None] * np.broadcast_to(glow, 3)
+    low, high = entity.vector("p0", (0.0, 0.0, 0.0)), entity.vector("p1", (1.0, 1.0, 1.0))
+    box = np.diag([*(high - low), 1.0])
+    box[:3, 3] = low
+    return GridMedium(
+        density,
+        job.world @ entity.matrix @ box,
+        absorbed,
+        scattered,
+        phase=HenyeyGreenstein(entity.number("g", 0.0)),
+        scale=entity.number("scale", 1.0),
+        emission=glow,
+    )
+
+
+def _voxels(entity: Entity, name: str, size: tuple[int, ...]) -> Any:
+    """Return the numbers of a grid (z, y, x); None without."""
+    given = entity.array(name, ("float",))
+    if given is not None and len(given) != np.prod(size, dtype=float):
+        raise SceneError(
+            f"{name} has {len(given)} numbers; nx, ny and nz make {np.prod(size, dtype=float):g}"
+        )
+    return None if given is None else np.reshape(given, size)
+
+
+unsupported("medium", "rgbgrid cloud nanovdb")
 
 
 def material_of(state: Any, alpha: Value, job: Job, label: Entity) -> Material:
