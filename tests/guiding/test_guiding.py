@@ -132,6 +132,27 @@ def test_cells_tell_points_and_normals_apart() -> None:
     assert (cells.coarser(cells.of(point, normal), 0) == [2, 2, 0]).all()
 
 
+def test_cells_are_those_of_a_grid_for_each_axis() -> None:
+    """A cubic grid around all but 0.2 % of the points on each side, and a margin of 1 %."""
+    point, normal = np.random.default_rng(1).uniform(-1, 1, (3, 1000)).astype(f4), directions(1000)
+    cells = GuideCells.around(point, 3)
+    low, high = np.quantile(point, (0.002, 0.998), axis=1)
+    extent = (high - low).max()
+    point[:, :50] *= 3  # points outside belong to the nearest cell
+    at = (point - (low - 0.01 * extent)[:, None]) / (extent * 1.02 / 8)
+    inside = (np.abs(at - np.round(at)) > 1e-4).all(0)
+    x, y, z = at.clip(0, 7.5).astype(int)
+    axis = np.abs(normal).argmax(0)
+    number = 2 * axis + (np.take_along_axis(normal, axis[None], 0)[0] < 0)
+    found = cells.of(point, normal)
+    assert inside.sum() > 990
+    assert (found == ((number * 8 + x) * 8 + y) * 8 + z)[inside].all()
+    for level, side in enumerate((1, 2, 4, 8)):
+        step = 8 // side
+        expected = ((number * side + x // step) * side + y // step) * side + z // step
+        assert (cells.coarser(found, level) == expected)[inside].all()
+
+
 # --- The mixture ----------------------------------------------------------------------------------
 
 
