@@ -570,8 +570,8 @@ def test_planes_that_would_cut_are_named() -> None:
 
 
 def test_the_first_sensor_that_there_is_counts() -> None:
-    views = {"a": {"type": "radiancemeter"}, "b": {"type": "thinlens", "aperture_radius": 0.1}}
-    with pytest.warns(UserWarning, match=r"a \(radiancemeter\): left out") as found:
+    views = {"a": {"type": "distant"}, "b": {"type": "thinlens", "aperture_radius": 0.1}}
+    with pytest.warns(UserWarning, match=r"a \(distant\): left out") as found:
         made = scene(False, **views, c={"type": "perspective"})
     assert made.camera is not None
     assert made.camera.projection.aperture == 0.2  # type: ignore[attr-defined]

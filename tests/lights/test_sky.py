@@ -293,7 +293,7 @@ def test_files_that_hold_no_sky(data, tmp_path: Path, monkeypatch) -> None:
 
 
 def test_without_mitsuba(monkeypatch) -> None:
-    monkeypatch.setattr(hosek_wilkie, "find_spec", lambda name: None)
+    monkeypatch.setattr(hosek_wilkie.PathFinder, "find_spec", lambda name: None)
     with pytest.raises(wf.SceneError, match="pip install mitsuba"):
         wf.Sky.hosek_wilkie(3, 0, (0, 1, 0))
 

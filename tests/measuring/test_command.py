@@ -67,7 +67,7 @@ def test_a_checkpoint_goes_on_from_another_folder(folder: Path, monkeypatch: pyt
         (["--points", "none.csv"], "none.csv: there is no such file"),
         (["--grid", "0,0,0:1,0,0:2x2"], "'0,0,0:1,0,0:2x2' is not CORNER:EDGE:EDGE:NxM"),
         (["--points", "points.csv", "-o", "out.png"], "out.png: a measurement is saved as npz or csv"),
-        ([], "one of the arguments --grid --points is required"),
+        ([], "scene.obj: has no sensor that measures light; give points by --grid or --points"),
     ],
 )
 def test_wrong_options_are_named(

@@ -441,3 +441,12 @@ def test_grids_are_in_the_middle_of_cells() -> None:
     points, normals = wf.grid_points((1, 1, 1), (2, 0, 0), (0, 0, 4), (2, 4))
     assert points[:3].tolist() == [[1.5, 1, 1.5], [2.5, 1, 1.5], [1.5, 1, 2.5]]
     assert (normals == (0, -1, 0)).all()
+
+
+def test_a_sensor_of_radiance_may_be_on_a_surface_at_the_origin() -> None:
+    """There the coordinates have no rounding by which a ray could be moved off the surface."""
+    floor = wf.Rectangle((-1, -1, 0), (2, 0, 0), (0, 2, 0), material=wf.Diffuse(0))
+    found = wf.measure(
+        [floor, wf.Environment(1)], [(0, 0, 0)], (0, 0, 1), kind="radiance", spp=4, progress=False
+    )
+    assert found.value.tolist() == [[1, 1, 1]]

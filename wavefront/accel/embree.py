@@ -24,6 +24,9 @@ def installed() -> bool:
     return True
 
 
+LEAST_REACH = 2.0**-20  # what a step is in proportion to, for rays from the origin that hit there
+
+
 class EmbreeAccelerator:
     """Triangles by Embree, curved primitives by NumPy; see base.Accelerator.
 
@@ -123,7 +126,9 @@ class EmbreeAccelerator:
             start, along = origin.take(repeat, 1).astype(np.float64), direction.take(repeat, 1)
             size = np.abs(start).max(0) / np.abs(along).max(0)
             t = hits.t.take(repeat).astype(np.float64)
-            t += step * (size + t)
+            reach = size + t
+            reach[reach == 0] = LEAST_REACH
+            t += step * reach
             found = self._run((start + t * along).astype(f4), along)
             beyond = (t + found.t).astype(f4)
             hits.t[repeat], hits.prim[repeat] = beyond, found.prim

@@ -3,6 +3,7 @@
 from .base import Camera, check_camera, field_of_view, image_size, upward
 from .projection import Orthographic, Panorama, Perspective, Projection
 from .sensors import Sensors
+from .surface_sensors import SurfaceSensors
 
 __all__ = [
     "Camera",
@@ -11,6 +12,7 @@ __all__ = [
     "Perspective",
     "Projection",
     "Sensors",
+    "SurfaceSensors",
     "check_camera",
     "field_of_view",
     "image_size",

@@ -16,6 +16,7 @@ from .base import MAX_SIDE, Camera
 from .projection import Orthographic
 
 KINDS = ("irradiance", "fluence", "radiance")
+LIFT = 2.0**-22  # of the size of scene and points together: above the rounding of both to float32
 
 
 class Sensors(Camera):
@@ -30,8 +31,6 @@ class Sensors(Camera):
         for fluence.
     kind
         "irradiance", W·m⁻², "fluence", W·m⁻², or "radiance", W·sr⁻¹·m⁻².
-    lift
-        How far sensors of irradiance are above their points, along their normals, scene units.
 
     Raises
     ------
@@ -39,9 +38,7 @@ class Sensors(Camera):
         If there is no point, an array is malformed, or a direction is zero or missing.
     """
 
-    def __init__(
-        self, points: ArrayLike, directions: ArrayLike | None, kind: str = "irradiance", lift: float = 0
-    ) -> None:
+    def __init__(self, points: ArrayLike, directions: ArrayLike | None, kind: str = "irradiance") -> None:
         self.sensor = one_of("kind", kind, KINDS)
         self.points = finite_array("points", points, (None, 3))
         count = len(self.points)
@@ -49,7 +46,8 @@ class Sensors(Camera):
             raise SceneError("points is empty; there must be at least one point")
         self.directions = self._unit_directions(directions)
         self.scatterings = int(kind != "radiance")
-        self.lift = lift
+        self.lies_on_surfaces = kind == "irradiance"
+        self.lift = 0.0  # how far they are above their points, along their normals, scene units
         rows = -(-count // MAX_SIDE)
         middle = (self.points.min(0) + self.points.max(0)) / 2
         super().__init__(middle, np.eye(3), Orthographic(1), (-(-count // rows), rows))
@@ -74,6 +72,18 @@ class Sensors(Camera):
     def __repr__(self) -> str:
         """Return what is measured, and at how many points."""
         return f"<Sensors: {self.sensor} at {len(self.points)} points>"
+
+    @property
+    def extent(self) -> NDArray[np.float64]:
+        """(k, 3) points that the sensors are between, scene units."""
+        return self.points
+
+    def above(self, bounds: NDArray[np.float64]) -> Self:
+        """Return the same sensors above surfaces that they may lie on; `bounds` (2, 3) are the scene's."""
+        sensors = copy(self)
+        size = np.linalg.norm(np.ptp(np.concatenate([self.extent, bounds]), axis=0))
+        sensors.lift = LIFT * float(size) if self.lies_on_surfaces else 0.0
+        return sensors
 
     @property
     def places(self) -> NDArray[np.float64]:

@@ -7,12 +7,14 @@ import os
 from typing import Any
 
 from ..arrays.vec import Doubles
+from ..camera import Sensors
 from ..camera.sensors import KINDS
 from ..core.errors import Interrupted, RenderError, SaveError, SceneError
 from ..image import Image
 from ..measuring import Measurement, grid_points, load_points
-from ..measuring.measure import measured, sensors_for
+from ..measuring.measure import measured
 from ..measuring.measurement import file_kind
+from ..scene import Scene
 from .command import SCENE_FILE, add_command
 from .messages import ERROR, INTERRUPTED, print_done, print_error, print_note
 from .options import add_settings, framing, read_scene, setting_values, size, vector
@@ -28,11 +30,12 @@ def add_measure_command(commands: Any) -> None:
         [
             "wavefront measure room.glb --grid 0,0.8,0:0,0,3:4,0,0:8x6 --noise 0.01 -o desk.csv",
             "wavefront measure room.glb --points sensors.csv --normal 0,1,0 --aov direct --aov indirect",
+            "wavefront measure meter.xml -o meter.csv  # what a sensor of the scene file measures",
         ],
     )
     command.add_argument("scenes", nargs=1, metavar="scene", help=SCENE_FILE)
     command.add_argument("-o", "--output", default="out.csv", help="csv or npz file to write")
-    where = command.add_mutually_exclusive_group(required=True)
+    where = command.add_mutually_exclusive_group()
     where.add_argument(
         "--grid",
         type=_grid,
@@ -63,18 +66,14 @@ def _measure(options: argparse.Namespace) -> int:
     """Measure and save; return the exit status."""
     file_kind(options.output)
     (path,), progress = options.scenes, False if options.quiet else None
-    if options.grid is not None:
-        points, normals = options.grid
-    else:
-        points, normals = load_points(os.path.join(options.folder, options.points))
-    normals = None if options.kind == "fluence" else normals if options.normal is None else options.normal
+    given = _given_sensors(options)
     scene = read_scene(path, options, progress)
+    sensors = _sensors_of(path, scene) if given is None else given.above(scene.bounds)
     settings = {**framing(options), **setting_values(options), "progress": progress}
     image: Image | None
     status = 0
     try:
         command = {"arguments": options.arguments, "folder": options.folder}
-        sensors = sensors_for(scene, points, normals, options.kind)
         image = measured(scene, sensors, settings.pop("spp", None), settings, command).image
     except Interrupted as stop:
         image, status = stop.image, INTERRUPTED
@@ -83,6 +82,25 @@ def _measure(options: argparse.Namespace) -> int:
         image, status = error.image, ERROR
         print_error(error)
     return (image is not None and _save(Measurement(image), options.output)) or status
+
+
+def _given_sensors(options: argparse.Namespace) -> Sensors | None:
+    """Return the sensors that the options describe, None without."""
+    if options.grid is not None:
+        points, normals = options.grid
+    elif options.points is not None:
+        points, normals = load_points(os.path.join(options.folder, options.points))
+    else:
+        return None
+    normals = None if options.kind == "fluence" else normals if options.normal is None else options.normal
+    return Sensors(points, normals, options.kind)
+
+
+def _sensors_of(path: str, scene: Scene) -> Sensors:
+    """Return the sensors that a scene file has."""
+    if not isinstance(scene.camera, Sensors):
+        raise SceneError(f"{path}: has no sensor that measures light; give points by --grid or --points")
+    return scene.camera
 
 
 def _save(found: Measurement, output: str) -> int:

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from ..camera import Camera
+from ..camera import Camera, Sensors
 from ..codecs.display import Display
 from ..codecs.images import check_display, check_writable
 from ..core.errors import Interrupted, RenderError, SaveError, SceneError
@@ -118,6 +118,9 @@ def _render_scene(path: str, output: str, options: argparse.Namespace) -> int:
     """Render a scene and save the picture; return the exit status."""
     progress = False if options.quiet else None
     scene = read_scene(path, options, progress)
+    given = (options.origin, options.view, options.direction)
+    if isinstance(scene.camera, Sensors) and all(each is None for each in given):
+        raise SceneError(f"{path}: has a sensor that measures light: wavefront measure {path} -o out.csv")
     image: Image | None
     status = 0
     try:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import struct
 from functools import lru_cache
-from importlib.util import find_spec
+from importlib.machinery import PathFinder
 from pathlib import Path
 
 import numpy as np
@@ -91,7 +91,7 @@ def _cube_root(x: float) -> float:
 
 
 def _path() -> Path:
-    found = find_spec("mitsuba")
+    found = PathFinder.find_spec("mitsuba")  # also where it is imported, which hides its place
     places = [] if found is None else found.submodule_search_locations or []
     for folder in places:
         if (Path(folder) / FILE).is_file():

@@ -290,6 +290,7 @@ class Sky(Parametrized, Light):
         *,
         scale: float = 1.0,
         disk: bool = True,
+        ground: ArrayLike | None = None,
         group: str = DEFAULT_GROUP,
     ) -> Self:
         """Return a clear sky in color, with the data that the package `mitsuba` brings.
@@ -310,6 +311,8 @@ class Sky(Parametrized, Light):
             of a radiance is cd·m⁻².
         disk
             Whether the sun itself is part of the light. It is even; the model's limb darkening is averaged.
+        ground
+            Albedo of the ground that is seen below the horizon; None for `ground_albedo`.
         up, group
             As for `Sky`.
 
@@ -328,7 +331,7 @@ class Sky(Parametrized, Light):
             up,
             scale=factor * radiance,
             direct_normal=factor * solar if disk else 0.0,
-            ground=albedo,
+            ground=albedo if ground is None else ground,
             group=group,
         )
 

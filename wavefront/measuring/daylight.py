@@ -17,7 +17,7 @@ from ..lights import PatchedEnvironment, SkyPatches
 from ..scene import Scene
 from ..scene.sun_position import horizon_axes
 from ..settings import AUTO, RenderSettings, takes_settings, whole_number
-from .measure import lifted, measured
+from .measure import measured
 from .weather import Weather, product
 from .year import Year
 
@@ -149,7 +149,7 @@ class DaylightCoefficients:
         cosine, height = product(self.normals, weather.sun.T), weather.height(self.patches)
         lit = (cosine > 0) & (height > 0) & (weather.direct_normal > 0)
         at, hour = np.nonzero(lit)
-        places = lifted(self._scene, Sensors(self.points, self.normals)).places
+        places = Sensors(self.points, self.normals).above(self._scene.bounds).places
         for start in range(0, at.size, PAIRS):
             i, h = at[start : start + PAIRS], hour[start : start + PAIRS]
             sensors = Sensors(places[i], weather.sun[h], "radiance")
@@ -225,7 +225,7 @@ def daylight_coefficients(
         raise SceneError("a shape of the scene emits; daylight coefficients are those of the sky alone")
     subject.lights = [PatchedEnvironment(np.ones((3, 1), f4), patches=patches)]
     sensors = Sensors(points, normals)
-    places = lifted(subject, sensors)
+    places = sensors.above(subject.bounds)
     wave = max(256, WAVE_VALUES // (3 * len(patches)))
     bounds = [count * batch // BATCHES for batch in range(BATCHES + 1)]
     given = {"wave_size": wave, **settings, "up": AUTO, "aovs": ("light_groups",)}

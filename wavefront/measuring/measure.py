@@ -6,10 +6,8 @@ from collections.abc import Mapping
 from copy import copy
 from typing import Any, Unpack
 
-import numpy as np
 from numpy.typing import ArrayLike
 
-from ..arrays.vec import Doubles
 from ..camera import Sensors
 from ..core.errors import SceneError
 from ..film.aov_names import chosen_aovs
@@ -20,7 +18,6 @@ from ..session import Session
 from ..settings import AUTO, RenderSettings, refuse, takes_settings
 from .measurement import Measurement
 
-LIFT = 2.0**-22  # of the size of scene and points together: above the rounding of both to float32
 PLACES = "sensors are at the points that are given"
 PIXELS = "each sensor is a place of its own, and no picture"
 REFUSED = dict.fromkeys(("camera", "size", "view", "fov"), PLACES) | {"background": PIXELS, "denoise": PIXELS}
@@ -90,7 +87,7 @@ def measure(
     subject = as_scene(
         scene, settings.get("material"), settings.get("progress"), settings.get("smooth", AUTO)
     )
-    return measured(subject, sensors_for(subject, points, normals, kind), spp, settings)
+    return measured(subject, Sensors(points, normals, kind).above(subject.bounds), spp, settings)
 
 
 def measured(
@@ -127,20 +124,3 @@ def sensor_settings(given: Mapping[str, Any]) -> dict[str, Any]:
     lighting = given.get("lighting", AUTO)
     fixed = {"reuse": False, "caustics": False, "denoise": False, "filter": "box", "ground": False}
     return {**given, **fixed, "aovs": aovs, "lighting": None if lighting == AUTO else lighting}
-
-
-def sensors_for(scene: Scene, points: ArrayLike, normals: ArrayLike | None, kind: str) -> Sensors:
-    """Return the sensors of `measure`, above the surfaces that they may lie on."""
-    return lifted(scene, Sensors(points, normals, kind))
-
-
-def lifted(scene: Scene, sensors: Sensors) -> Sensors:
-    """Return sensors of irradiance above the surfaces that they may lie on; others as they are."""
-    sensors = copy(sensors)
-    sensors.lift = LIFT * size_of(scene, sensors.points) if sensors.sensor == "irradiance" else 0
-    return sensors
-
-
-def size_of(scene: Scene, points: Doubles) -> float:
-    """Return the size of a scene with points (n, 3): the diagonal of the box around all, scene units."""
-    return float(np.linalg.norm(np.ptp(np.concatenate([points, scene.bounds]), axis=0)))

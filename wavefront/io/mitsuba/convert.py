@@ -6,13 +6,14 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
+from ...camera import Sensors, SurfaceSensors
 from ...scene import Scene
 from ..repair import RawMesh
 from ..sources import SceneFiles
 from . import bsdfs, emitters, shapes, textures, volumes  # noqa: F401  they fill the table
 from .media import medium_around
 from .nodes import Graph, Job, Node, plugin
-from .views import check_clipping
+from .views import check_clipping, meter_on
 
 
 def convert(
@@ -56,19 +57,37 @@ DEFINED = "bsdf texture sampler film rfilter medium phase volume"  # for others 
 
 @plugin("scene", "scene", "", f"shape emitter sensor integrator {DEFINED}", "allow_thread_reordering")
 def _scene(node: Node, job: Job) -> Scene:
-    seen = [(sensor, view) for sensor in node.held("sensor") if (view := job.convert(sensor)) is not None]
-    for sensor, _ in seen[1:]:
-        node.lose(f"the further sensor {sensor.plugin!r}")
-    camera, settings = seen[0][1] if seen else (None, {})
-    job.eye = camera.origin if seen else None
     parts = [part for part in node.held("shape") if part.plugin != "shapegroup"]
+    carried = [(sensor, part) for part in parts for sensor in part.held("sensor")]
+    sensors = [(sensor, node) for sensor in node.held("sensor")] + carried
+    seen = [(*each, view) for each in sensors if (view := job.convert(each[0])) is not None]
+    for sensor, *_ in seen[1:]:
+        node.lose(f"the further sensor {sensor.plugin!r}")
+    camera, settings = seen[0][2] if seen else (None, {})
+    job.eye = None if camera is None else camera.origin
     found = [shape for part in parts for shape in job.convert(part)]
     lamps = [part for part in node.held("emitter") if part.plugin != "area"]
-    lights = [light for part in lamps if (light := job.convert(part)) is not None]
+    made = [light for part in lamps if (light := job.convert(part)) is not None]
+    lights = [light for each in made for light in (each if isinstance(each, list) else [each])]
     for integrator in node.held("integrator")[:1]:
         settings = settings | job.convert(integrator)
-    if seen:
+    if seen and camera is None:
+        camera = _meter(*seen[0][:2], job)
+    elif seen and not isinstance(camera, Sensors):
         check_clipping(seen[0][0], camera, found)
+    if isinstance(camera, Sensors) and settings.pop("background", None):
+        node.lose("hide_emitters for a sensor that measures light")
     if settings.get("background") and any(shape.emission is not None for shape in found):
         node.lose("hide_emitters for shapes that emit")
-    return Scene(found, lights, camera, settings=settings, medium=medium_around(node, job))
+    scene = Scene(found, lights, camera, settings=settings, medium=medium_around(node, job))
+    if isinstance(camera, Sensors) and found:
+        scene.camera = camera.above(scene.bounds)
+    return scene
+
+
+def _meter(sensor: Node, place: Node, job: Job) -> SurfaceSensors | None:
+    """Return what measures the irradiance on the shape that holds a sensor."""
+    meter = meter_on(job.convert(place)) if place.kind == "shape" else None
+    if meter is None:
+        sensor.lose("left out, as it is at no mesh or sphere")
+    return meter

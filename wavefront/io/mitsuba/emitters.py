@@ -2,18 +2,25 @@
 
 from __future__ import annotations
 
+from datetime import UTC, datetime, timedelta
 from typing import Any
 
 import numpy as np
 
+from ...arrays.elementary import sin_cos
 from ...arrays.vec import Doubles
+from ...colors.spectrum import Y_INTEGRAL
 from ...core.errors import SceneError
-from ...lights import DirectionalLight, Environment, PointLight, Projector, SpotLight
+from ...lights import DirectionalLight, Environment, Light, PointLight, Projector, Sky, SpotLight
+from ...scene.sun_position import sun_position
 from ...textures.base import BaseTexture
 from .nodes import Job, Node, plugin, unsupported
 from .textures import color, picture, pixels
 from .views import FIELD_OF_VIEW, vertical_fov
 
+DATE = (("year", 2010, 9999), ("month", 7, 12), ("day", 10, 31))
+CLOCK = (("hour", 15.0), ("minute", 0.0), ("second", 0.0))
+PLACE, TIME = "latitude longitude timezone", "year month day hour minute second"
 LEAST_ROWS = 3  # of an environment map; one with fewer repeats its last
 
 
@@ -82,12 +89,62 @@ def _environment_map(node: Node, job: Job) -> Environment:
     return Environment(image, transform=axes, scale=node.number("scale", 1.0), rows="poles")
 
 
-unsupported("directionalarea sunsky timed_sunsky", "emitter")
+@plugin(
+    "sunsky",
+    "emitter",
+    f"turbidity albedo sky_scale sun_scale sun_aperture complex_sun to_world sun_direction {PLACE} {TIME}",
+    note="needs the package mitsuba for its data, and pvlib for the sun at a time; its disk is even",
+)
+def _sun_and_sky(node: Node, job: Job) -> list[Light]:
+    """Return the sky, whose zenith is z, and the disk of the sun."""
+    up, sun = node.matrix()[:3, 2], _direction_of_sun(node)
+    albedo = _constant(node, "albedo", job, 0.3)
+    factors = {"sky": node.number("sky_scale", 1.0), "sun": node.number("sun_scale", 1.0)}
+    if node.flag("complex_sun"):
+        node.lose("complex_sun")
+
+    def sky(factor: float, disk: bool) -> Sky:
+        scale = factor / Y_INTEGRAL  # as Mitsuba does
+        turbidity = node.number("turbidity", 3.0)
+        return Sky.hosek_wilkie(turbidity, albedo, sun, up, scale=scale, disk=disk, ground=0.0)
+
+    found: list[Light] = [sky(factors["sky"], disk=False)] if factors["sky"] else []
+    if factors["sun"]:
+        power, aperture = sky(factors["sun"], disk=True).direct_normal, node.number("sun_aperture", 0.5358)
+        slant = (
+            1 + float(sin_cos(np.float64(np.radians(aperture) / 2))[1])
+        ) / 2  # the mean cosine on the disk
+        found.append(DirectionalLight(-sun, power * slant, angle=aperture))
+    return found
 
 
-def _constant(node: Node, name: str, job: Job) -> Doubles:
-    """Return light of a point or from far away, (3,), which cannot vary."""
-    value = color(node, name, 1.0, job, emission=True)
+def _direction_of_sun(node: Node) -> Doubles:
+    """Return the direction to the sun (3,), given as such or by place and time."""
+    stated = [name for name in (*PLACE.split(), *TIME.split()) if name in node.values]
+    if "sun_direction" in node.values:
+        if stated:
+            raise SceneError(f"has sun_direction and {stated[0]}; give one of them")
+        return node.vector("sun_direction", None)
+    year, month, day = (node.whole(name, default, 1, most) for name, default, most in DATE)
+    clock = {f"{name}s": node.number(name, default) for name, default in CLOCK}
+    try:
+        begin = datetime(year, month, day, tzinfo=UTC) - timedelta(hours=node.number("timezone", 9.0))
+        time = begin + timedelta(**clock)
+        east, north, height = sun_position(
+            time, node.number("latitude", 35.6894), node.number("longitude", 139.6917), up="z"
+        )
+    except (ValueError, OverflowError, ImportError) as error:
+        raise SceneError(f"the time of its sun: {error}") from error
+    local = np.array([-north, -east, height])  # as Mitsuba has it: x points south, and y west
+    return (node.matrix()[:3, :3] * local).sum(1)
+
+
+unsupported("directionalarea timed_sunsky", "emitter")
+
+
+def _constant(node: Node, name: str, job: Job, default: float = 1.0) -> Doubles:
+    """Return light of a point or from far away, (3,), or an albedo, which cannot vary."""
+    value = color(node, name, default, job, emission=name != "albedo")
     if isinstance(value, BaseTexture):
         raise SceneError(f"{name} is a texture; it must be a color")
     return np.asarray(np.broadcast_to(value, 3), np.float64)

@@ -30,17 +30,17 @@ from .transforms import frame
 SIDES = 128  # of round shapes that are meshes
 ROUND = 1e-4  # relative difference of the scales along two axes that is taken for rounding
 POLES = np.array([[0.0, 0, -1], [-1, 0, 0], [0, 1, 0]])  # from the axes of a `Sphere` to those of Mitsuba
-SURFACE = "to_world flip_normals"
+SURFACE, PARTS = "to_world flip_normals", "bsdf emitter medium sensor"
 
 
-@plugin("rectangle", "shape", SURFACE, "bsdf emitter medium")
+@plugin("rectangle", "shape", SURFACE, PARTS)
 def _rectangle(node: Node, job: Job) -> list[Shape]:
     corners = np.array([[-1.0, -1, 0], [1, -1, 0], [1, 1, 0], [-1, 1, 0]])
     faces = np.array([[0, 1, 2], [0, 2, 3]])
     return _mesh(node, job, RawMesh("rectangle", corners, faces, uvs=(corners[:, :2] + 1) / 2))
 
 
-@plugin("cube", "shape", SURFACE, "bsdf emitter medium")
+@plugin("cube", "shape", SURFACE, PARTS)
 def _cube(node: Node, job: Job) -> list[Shape]:
     sides = ((1, 5, 4, 0), (3, 2, 6, 7), (1, 3, 7, 5), (5, 7, 6, 4), (4, 6, 2, 0), (3, 1, 0, 2))
     number = np.array(sides).reshape(-1)  # of a corner: a bit for each axis
@@ -52,7 +52,7 @@ def _cube(node: Node, job: Job) -> list[Shape]:
     return _mesh(node, job, raw, closed=outside)
 
 
-@plugin("disk", "shape", SURFACE, "bsdf emitter medium", note="a mesh of 128 triangles")
+@plugin("disk", "shape", SURFACE, PARTS, note="a mesh of 128 triangles")
 def _disk(node: Node, job: Job) -> list[Shape]:
     ring, turns = _ring(np.sqrt(2 * np.pi / SIDES / sin_cos_turns(np.array([1 / SIDES]))[0][0]))
     count = np.arange(SIDES)
@@ -69,7 +69,7 @@ def _disk(node: Node, job: Job) -> list[Shape]:
     "cylinder",
     "shape",
     f"{SURFACE} p0 p1 radius",
-    "bsdf emitter medium",
+    PARTS,
     note="a mesh where it shines, is textured or elliptic",
 )
 def _cylinder(node: Node, job: Job) -> list[Shape]:
@@ -80,8 +80,9 @@ def _cylinder(node: Node, job: Job) -> list[Shape]:
     axes, matrix = frame(end - start), node.matrix()
     material, emission = _appearance(node, job)
     around = np.linalg.norm(matrix[:3, :3] @ axes[:, :2], axis=0)
+    needs_faces = emission is not None or node.held("sensor") or node.flag("flip_normals")
     even = abs(around[1] - around[0]) <= ROUND * around[0]
-    if even and emission is None and not node.flag("flip_normals") and not _textures(material, set()):
+    if even and not needs_faces and not _textures(material, set()):
         ends = np.stack([start, end]) @ matrix[:3, :3].T + matrix[:3, 3]
         pipe = Cylinders(ends[:1], ends[1:], radius * around[0], caps=False, material=material)
         return [_named(pipe, node)]
@@ -99,7 +100,7 @@ def _cylinder(node: Node, job: Job) -> list[Shape]:
     "sphere",
     "shape",
     f"{SURFACE} center radius",
-    "bsdf emitter medium",
+    PARTS,
     note="one radius",
 )
 def _sphere(node: Node, job: Job) -> list[Shape]:
@@ -127,7 +128,7 @@ def _sphere(node: Node, job: Job) -> list[Shape]:
     return [_named(ball, node)]
 
 
-@plugin("obj ply", "shape", f"{SURFACE} filename face_normals flip_tex_coords", "bsdf emitter medium")
+@plugin("obj ply", "shape", f"{SURFACE} filename face_normals flip_tex_coords", PARTS)
 def _file(node: Node, job: Job) -> list[Shape]:
     path = job.find(node.text("filename"))
     if path not in job.made:
@@ -142,7 +143,7 @@ def _file(node: Node, job: Job) -> list[Shape]:
     "serialized",
     "shape",
     f"{SURFACE} filename shape_index face_normals",
-    "bsdf emitter medium",
+    PARTS,
     note="versions 3 and 4",
 )
 def _serialized(node: Node, job: Job) -> list[Shape]:
@@ -158,6 +159,8 @@ def _serialized(node: Node, job: Job) -> list[Shape]:
 @plugin("shapegroup merge", "shape", holds="shape")
 def _group(node: Node, job: Job) -> list[Shape]:
     """Return its shapes, which are placed by instances."""
+    for sensor in (sensor for part in node.held("shape") for sensor in part.held("sensor")):
+        sensor.lose("left out, as it is in a group")
     return [shape for part in node.held("shape") for shape in job.convert(part)]
 
 

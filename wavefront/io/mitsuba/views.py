@@ -8,19 +8,21 @@ from typing import Any
 import numpy as np
 
 from ...arrays.elementary import arctan2, sin_cos
-from ...camera import Camera
+from ...camera import Camera, Sensors, SurfaceSensors
 from ...camera.projection import Orthographic, Perspective, Projection
 from ...core.errors import SceneError, number
-from ...shapes import Instance, Mesh, Shape
+from ...shapes import Instance, Mesh, Shape, Sphere
 from ..text_lines import numbers
 from .nodes import Job, Node, plugin, unsupported
 
 Settings = dict[str, Any]
+Crop = tuple[int, int, int, int] | None
 MOST_CHECKED = 1 << 16  # points of a shape that are compared with the planes of a sensor
 ENDLESS = 2**16  # bounces, where there is no limit
 CLIPPED = "to_world near_clip far_clip focus_distance"
 NO_CLIPPING = "near_clip and far_clip do not cut; named where they would"
 FIELD_OF_VIEW = "fov fov_axis focal_length"
+METER = "measures at one place, whatever the size of its film"
 LENS = f"{FIELD_OF_VIEW} principal_point_offset_x principal_point_offset_y"
 
 
@@ -28,10 +30,7 @@ LENS = f"{FIELD_OF_VIEW} principal_point_offset_x principal_point_offset_y"
 @plugin("thinlens", "sensor", f"{CLIPPED} aperture_radius {LENS}", "film sampler medium", note=NO_CLIPPING)
 @plugin("orthographic", "sensor", CLIPPED, "film sampler medium", note=NO_CLIPPING)
 def _sensor(node: Node, job: Job) -> tuple[Camera, Settings]:
-    film = node.held("film")
-    size, crop, settings = job.convert(film[0]) if film else ((768, 576), None, {"filter": "gaussian"})
-    for sampler in node.held("sampler"):
-        settings = settings | job.convert(sampler)
+    size, crop, settings = _picture(node, job)
     matrix = node.matrix()
     axes, origin, aspect = matrix[:3, :3], matrix[:3, 3], size[0] / size[1]
     scale = np.linalg.norm(axes, axis=0)
@@ -52,6 +51,47 @@ def _sensor(node: Node, job: Job) -> tuple[Camera, Settings]:
     return Camera(origin, axes, lens, size, crop), settings
 
 
+def _picture(node: Node, job: Job) -> tuple[tuple[int, int], Crop, Settings]:
+    """Return the size, the crop and the settings of the picture of a sensor."""
+    film = node.held("film")
+    size, crop, settings = job.convert(film[0]) if film else ((768, 576), None, {"filter": "gaussian"})
+    for sampler in node.held("sampler"):
+        settings = settings | job.convert(sampler)
+    return size, crop, settings
+
+
+def _meter_settings(node: Node, job: Job) -> Settings:
+    """Return the settings of a sensor that is no camera: only the light of the scene counts."""
+    return _picture(node, job)[2] | {"filter": "box", "lighting": None}
+
+
+@plugin("radiancemeter", "sensor", "to_world origin direction", "film sampler medium", note=METER)
+def _radiance_meter(node: Node, job: Job) -> tuple[Camera, Settings]:
+    origin, direction = node.matrix()[:3, [3, 2]].T
+    if "to_world" not in node.values and {"origin", "direction"} & node.values.keys():
+        origin, direction = node.vector("origin", None), node.vector("direction", None)
+    return Sensors(origin[None], direction, "radiance"), _meter_settings(node, job)
+
+
+@plugin("irradiancemeter", "sensor", "", "film sampler", note=f"of a mesh or sphere; {METER}")
+def _irradiance_meter(node: Node, job: Job) -> tuple[None, Settings]:
+    """Return its settings; where it is, its shape says."""
+    return None, _meter_settings(node, job)
+
+
+def meter_on(shapes: Sequence[Shape]) -> SurfaceSensors | None:
+    """Return what measures the irradiance on a shape that was converted; None where it has no faces."""
+    (shape,) = shapes or (None,)
+    ball, corners = np.zeros((1, 4)), np.zeros((0, 3, 3))
+    if isinstance(shape, Sphere):
+        ball[0] = (*shape.center, shape.radius)
+    elif isinstance(shape, Mesh):
+        corners = shape.vertices[shape.faces]
+    else:
+        return None
+    return SurfaceSensors(corners, np.array([len(corners)]), ball, "irradiance")
+
+
 @plugin(
     "hdrfilm specfilm",
     "film",
@@ -59,7 +99,7 @@ def _sensor(node: Node, job: Job) -> tuple[Camera, Settings]:
     holds="rfilter",
     harmless="file_format component_format sample_border compensate high_quality_edges banner",
 )
-def _film(node: Node, job: Job) -> tuple[tuple[int, int], tuple[int, ...] | None, Settings]:
+def _film(node: Node, job: Job) -> tuple[tuple[int, int], Crop, Settings]:
     width, height = node.whole("width", 768, 1), node.whole("height", 576, 1)
     left, top = node.whole("crop_offset_x", 0), node.whole("crop_offset_y", 0)
     right, bottom = left + node.whole("crop_width", width, 1), top + node.whole("crop_height", height, 1)
@@ -122,7 +162,7 @@ unsupported(
     "depth stokes direct_projective prb_basic prb_projective prbvolpath emission_reparam", "integrator"
 )
 unsupported("catmullrom lanczos mitchell", "rfilter")
-unsupported("batch distant irradiancemeter radiancemeter", "sensor")
+unsupported("batch distant", "sensor")
 
 
 def check_clipping(node: Node, camera: Camera, shapes: Sequence[Shape]) -> None:
