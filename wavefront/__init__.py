@@ -14,6 +14,7 @@ from .bsdfs import (
     Dielectric,
     Diffuse,
     Disney,
+    Measured,
     Mirror,
     Mix,
     NullSurface,
@@ -131,6 +132,7 @@ _LATER = {  # what many programs do without is imported when they ask for it
     ".io.volumes": ("load_grid",),
     ".measuring": (
         "DaylightCoefficients",
+        "Measured",
         "Measurement",
         "Weather",
         "Year",
@@ -187,6 +189,7 @@ __all__ = [
     "LightSampler",
     "LoadLimits",
     "Material",
+    "Measured",
     "Measurement",
     "Medium",
     "Mesh",

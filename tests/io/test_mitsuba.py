@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from measurements import adaptive_fields, tensor_file
 
 import wavefront as wf
 from wavefront.codecs.images import write_image
@@ -433,6 +434,19 @@ def test_spectrum_files(tmp_path: Path) -> None:
     (tmp_path / "a.spd").write_text("400 0.2\n500\n")
     with pytest.raises(wf.SceneError, match=r"a\.spd line 2: spectrum is '500'"):
         material("diffuse", reflectance=read)
+
+
+def test_measured_materials(tmp_path: Path) -> None:
+    path = tmp_path / "metal.bsdf"
+    path.write_bytes(tensor_file(adaptive_fields()))
+    assert type(material("measured", filename=str(path)).bsdf) is wf.Measured
+    board = {"type": "rectangle", "bsdf": {"type": "measured", "filename": str(path)}}
+    assert type(scene(board=board).shapes[0].material.bsdf) is wf.Sides
+    two = scene(a=dict(board), b={**board, "to_world": TURN}).shapes
+    assert two[0].material.bsdf.front is two[1].material.bsdf.front  # read once
+    path.write_bytes(b"none")
+    with pytest.raises(wf.SceneError, match=r"bsdf .*: .*metal\.bsdf: begins neither"):
+        material("measured", filename=str(path))
 
 
 # --- Emitters -------------------------------------------------------------------------------------

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 import pytest
 import trimesh
+from measurements import adaptive_fields, tensor_file
 
 import wavefront as wf
 from wavefront.arrays.vec import luminance
@@ -335,6 +336,17 @@ def test_materials(tmp_path: Path, statement: str, kind: Any, expected: dict[str
     assert type(found) is kind
     for name, value in expected.items():
         np.testing.assert_allclose(np.ravel(getattr(found, name)) - np.ravel(value), 0, atol=2e-4)
+
+
+def test_measured_materials(tmp_path: Path) -> None:
+    (tmp_path / "metal.bsdf").write_bytes(tensor_file(adaptive_fields()))
+    statement = 'Material "measured" "string filename" "metal.bsdf"'
+    assert type(material(tmp_path, statement).bsdf) is wf.Measured
+    with pytest.raises(wf.SceneError, match="the limit is 1000"):
+        wf.load(tmp_path / "scene.pbrt", limits=wf.LoadLimits(file_bytes=1000))
+    (tmp_path / "metal.bsdf").write_bytes(b"none")
+    with pytest.raises(wf.SceneError, match=r"line 3: material 'measured': .*metal\.bsdf: begins neither"):
+        material(tmp_path, statement)
 
 
 def test_attributes_need_not_be_read(tmp_path: Path) -> None:
@@ -686,7 +698,6 @@ def test_objects_are_placed_by_both_transforms(tmp_path: Path) -> None:
         ("", f'Shape "disk" "float size" 2 {BALL}', "line 3: shape 'disk': size"),
         ("", 'Shape "bilinearmesh" "point3 P" [ 0 0 0 1 0 0 0 1 0 1 1 1 ]', "the curvature of its patches"),
         ("", f'Material "hair" {BALL}', "material 'hair': a gray Diffuse in its place"),
-        ("", f'Material "measured" "string filename" "x.bsdf" {BALL}', "material 'measured': a gray Diffuse"),
         ("", f'Material "subsurface" {BALL}', "material 'subsurface': light below the surface"),
         (
             "",

@@ -10,16 +10,18 @@ import pytest
 from hypothesis import assume, given
 from hypothesis import strategies as st
 from jacobians import columns, doubles, few, inner, jacobian, some
+from measurements import measured
 
 from wavefront import bsdfs
 from wavefront.arrays.state import SurfaceInteraction
-from wavefront.arrays.vec import INV_PI
+from wavefront.arrays.vec import INV_PI, normalize
 from wavefront.bsdfs import (
     Bsdf,
     Conductor,
     Dielectric,
     Diffuse,
     Disney,
+    Measured,
     Mirror,
     Mix,
     OpenPBRBsdf,
@@ -31,6 +33,7 @@ from wavefront.bsdfs import (
     ThinDielectric,
     ThinDisney,
 )
+from wavefront.bsdfs.measured import UP, _coordinates, _elevation, _turned
 from wavefront.bsdfs.microfacet import Facets, alpha_of
 from wavefront.bsdfs.rough import RoughBsdf
 from wavefront.sampling.warp import cosine_hemisphere_inverse
@@ -122,11 +125,17 @@ KINDS = {
         transmission=part,
         diffuse_transmission=st.just(0.0) | st.floats(0.1, 2),
     ),
+    Measured: st.builds(measured, st.sampled_from(["0", "1", "2", "4", "merl"])),
     ByValue: st.builds(ByValue, part),
     Sides: st.builds(Sides, MATTE, st.none() | st.builds(Mirror, color)),
     Mix: st.builds(Mix, MATTE, SHINY | st.builds(Mirror, color), st.floats(0.1, 0.9)),
 }
 kinds = pytest.mark.parametrize("kind", KINDS, ids=lambda kind: kind.__name__)
+integrals = pytest.mark.parametrize(
+    "kind",
+    [pytest.param(kind, marks=[pytest.mark.slow] if kind is Measured else []) for kind in KINDS],
+    ids=lambda kind: kind.__name__,
+)
 scattering = pytest.mark.parametrize(
     "kind", [kind for kind in KINDS if kind is not Mirror], ids=lambda kind: kind.__name__
 )
@@ -135,7 +144,7 @@ cubes = st.tuples(inner, inner, inner)
 
 
 def test_every_bsdf_is_here() -> None:
-    assert {*bsdfs.ALL, ShadowCatcher, ByValue} == set(KINDS)
+    assert {*bsdfs.ALL, ShadowCatcher, Measured, ByValue} == set(KINDS)
 
 
 def bound_to(bsdf: Bsdf, wo: np.ndarray, inside: bool) -> Bsdf:
@@ -203,10 +212,23 @@ def unstretched_inverse(w: np.ndarray, facets: Facets) -> np.ndarray:
     return cosine_hemisphere_inverse(wide / np.linalg.norm(wide))
 
 
+def tables_inverse(bsdf: Measured, wo: np.ndarray, wi: np.ndarray) -> np.ndarray:
+    """The u (2, 1) that measured tables map to wi (3, 1), whose numbers come from a first density."""
+    axes = bsdf._axes(wo)
+    seen = _turned(wo, axes)
+    m = normalize(seen + _turned(wi, axes))
+    u, mix = _coordinates(m, _elevation(m, UP)), bsdf.data.mix(seen)
+    for density in (bsdf.data.density, bsdf.data.before):
+        u = u if density is None else density.inverse(u, mix)[0]
+    return u
+
+
 def preimages(bsdf: Bsdf, wo: np.ndarray, wi: np.ndarray, inside: bool) -> list[np.ndarray]:
     """All u (2, 1) that may be mapped to wi, without repeats."""
     found = [cosine_hemisphere_inverse(wi)]
     found += [unstretched_inverse(wi, facets) for facets in facets_of(bound_to(bsdf, wo, inside))]
+    if isinstance(bsdf, Measured):
+        found.append(tables_inverse(bsdf, wo, wi))
     halves = [wo + wi, wo + wi * columns(1, 1, -1)]
     halves += [wo + eta * wi for eta in indices_of(bsdf, inside)]
     for half in halves:
@@ -291,7 +313,7 @@ def test_samples_keep_their_promises(kind, data, z, inside, u):
     np.testing.assert_allclose(sample.weight, due, rtol=2e-5, atol=1e-7)
 
 
-@kinds
+@integrals
 @few
 @given(data=st.data(), z=cosines, inside=st.booleans())
 def test_densities_integrate_to_the_chance_of_a_sample(kind, data, z, inside):

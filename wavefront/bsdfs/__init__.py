@@ -6,6 +6,7 @@ from .dielectric import Dielectric
 from .diffuse import Diffuse
 from .disney import Disney
 from .disney_thin import ThinDisney
+from .measured import Measured
 from .mirror import Mirror
 from .mix import Mix
 from .null import NullSurface
@@ -17,6 +18,7 @@ from .shadow_catcher import ShadowCatcher
 from .sides import Sides
 from .thin import ThinDielectric
 
+# all that need no file
 ALL = (
     Diffuse,
     Mirror,
@@ -41,6 +43,7 @@ __all__ = [
     "Dielectric",
     "Diffuse",
     "Disney",
+    "Measured",
     "Mirror",
     "Mix",
     "NullSurface",

@@ -71,6 +71,25 @@ def spectrum_rgb(pairs: Sequence[tuple[float, float]], *, emission: bool, bounde
     return np.clip(TO_RGB @ xyz, 0, 1 if bounded else None)
 
 
+def reflectance_weights(wavelengths: Doubles) -> Doubles:
+    """Return the weights (3, k) by which values at rising wavelengths (k,), in nm, make a color under D65.
+
+    Values are linear in between. They are 0 beyond the wavelengths, which counts as black.
+    """
+    table = np.arange(len(X)) * STEP + float(FIRST)
+    place = np.clip(np.searchsorted(wavelengths, table) - 1, 0, max(len(wavelengths) - 2, 0))
+    start, end = wavelengths[place], wavelengths[np.minimum(place + 1, len(wavelengths) - 1)]
+    part = (table - start) / np.where(end > start, end - start, 1)
+    weight = np.stack([row[0] * X + row[1] * Y + row[2] * Z for row in TO_RGB]) * D65
+    weight /= weight.sum(1, keepdims=True)
+    weight = np.where((table >= wavelengths[0]) & (table <= wavelengths[-1]), weight, 0)
+    out = np.zeros((3, len(wavelengths)))
+    for channel in range(3):
+        np.add.at(out[channel], place, weight[channel] * (1 - part))
+        np.add.at(out[channel], np.minimum(place + 1, len(wavelengths) - 1), weight[channel] * part)
+    return out
+
+
 def uniform_emission(value: float) -> Doubles:
     """Return the color (3,) of light of the same power at all wavelengths, which is not white in RGB."""
     return np.asarray(value * TO_RGB.sum(1))

@@ -16,6 +16,7 @@ from ...bsdfs import (
     Dielectric,
     Diffuse,
     Disney,
+    Measured,
     Mirror,
     Mix,
     Plastic,
@@ -34,7 +35,14 @@ from .textures import bitmap, color, roughness, scalar
 
 LEAST_INDEX = 1e-6
 MAPPED = "use_shadowing_function flip_invalid_normals"
-ONE_SIDED = ("diffuse", "conductor", "roughconductor", "plastic", "roughplastic")  # the back is black
+ONE_SIDED = (
+    "diffuse",
+    "conductor",
+    "roughconductor",
+    "plastic",
+    "roughplastic",
+    "measured",
+)  # the back is black
 
 
 class ShadingFrameMap(NormalMap):
@@ -135,7 +143,16 @@ def _normal(node: Node, job: Job) -> Material:
     return _mapped(node, job, ShadingFrameMap, None)
 
 
-unsupported("circular hair measured measured_polarized polarizer pplastic retarder", "bsdf")
+@plugin("measured", "bsdf", "filename", note="spectra become RGB under D65")
+def _measured(node: Node, job: Job) -> Material:
+    path = job.find(node.text("filename"))
+    key = ("measured", path)
+    if key not in job.made:
+        job.made[key] = Measured.from_bytes(str(path), job.files.read(path))
+    return _named(node, job.made[key])
+
+
+unsupported("circular hair measured_polarized polarizer pplastic retarder", "bsdf")
 
 
 def _inner(node: Node, job: Job) -> Material:

@@ -9,7 +9,17 @@ import numpy as np
 
 from ...arrays.elementary import exp
 from ...arrays.vec import f4
-from ...bsdfs import Conductor, Dielectric, Diffuse, Mix, NullSurface, Plastic, Principled, ThinDielectric
+from ...bsdfs import (
+    Conductor,
+    Dielectric,
+    Diffuse,
+    Measured,
+    Mix,
+    NullSurface,
+    Plastic,
+    Principled,
+    ThinDielectric,
+)
 from ...bsdfs.fresnel import fresnel_dielectric
 from ...core.errors import SceneError, number
 from ...materials import Material
@@ -200,7 +210,16 @@ def _interface(entity: Entity, job: Job) -> Material:
     return Material(NullSurface(), name=entity.name or None)
 
 
-unsupported("material", "hair measured")
+@converts("material", "measured")
+def _measured(entity: Entity, job: Job) -> Material:
+    path = job.find(entity.text("filename"))
+    key = ("measured", path)
+    if key not in job.made:
+        job.made[key] = Measured.from_bytes(str(path), job.files.read(path))
+    return _made(entity, job.made[key], job)
+
+
+unsupported("material", "hair")
 
 
 @converts("medium", "homogeneous")
