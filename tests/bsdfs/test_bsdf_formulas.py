@@ -356,6 +356,9 @@ def test_rough_metal(roughness):
     assert Conductor(0.5, 3, roughness, multiscatter=False).f(wo, wi)[1] == pytest.approx(
         exact, rel=5e-4, abs=1e-6
     )
+    part = Conductor(0.5, 3, roughness, reflectance=(0.25, 0.5, 1), multiscatter=False).f(wo, wi)
+    np.testing.assert_allclose(part, part[2] * np.array([[0.25], [0.5], [1]]), rtol=1e-6)
+    assert part[2] == pytest.approx(exact, rel=5e-4, abs=1e-6)
 
 
 @pytest.mark.parametrize("back_facing", [False, True])

@@ -288,7 +288,11 @@ RANDOM = {
     Diffuse: lambda rng, roughness: Diffuse(color(rng)),
     Mirror: lambda rng, roughness: Mirror(color(rng)),
     Conductor: lambda rng, roughness: Conductor(
-        rng.uniform(0.1, 3, 3), rng.uniform(0, 6, 3), roughness, **facets(rng, roughness)
+        rng.uniform(0.1, 3, 3),
+        rng.uniform(0, 6, 3),
+        roughness,
+        reflectance=color(rng),
+        **facets(rng, roughness),
     ),
     Dielectric: lambda rng, roughness: Dielectric(
         index(rng), roughness, reflectance=color(rng), transmittance=color(rng), **facets(rng, roughness)

@@ -54,6 +54,7 @@ EXAMPLES = {
         {"eta": 0.1, "k": 8.0, "roughness": 0.7, "distribution": "beckmann", "shadowing": "separable"},
         {"eta": 2.0, "k": 4.0, "roughness": 0.8, "roughness_v": 0.3, "rotation": -20.0},
         {"eta": 2.0, "k": 4.0, "roughness": 0.8, "multiscatter": False},
+        {"eta": 2.0, "k": 4.0, "roughness": 0.3, "reflectance": (0.2, 0.5, 1.0)},
     ],
     OrenNayar: [
         {"reflectance": (1, 0.5, 0), "sigma": 0.5},
@@ -310,6 +311,7 @@ BAD = {
     Conductor: {
         "eta": [(0, "more than 0"), ((1, 0, 1), "more than 0"), (1e7, "[0, 1e+06]")],
         "k": [(-1, "[0, 1e+06]")],
+        "reflectance": [1.5],
         "roughness": [1.1],
         "roughness_v": [-0.2],
         "rotation": [(np.inf, "finite")],

@@ -228,6 +228,9 @@ def test_metals_and_glass() -> None:
     assert value(gold.k) == pytest.approx([3.983, 2.3856, 1.6034], 1e-4)
     own = material("roughconductor", eta=rgb(1, 2, 3), k=4.0, alpha=0.25, distribution="ggx").bsdf
     assert (value(own.eta), value(own.k), value(own.roughness)) == ([1, 2, 3], [4] * 3, [0.5])
+    worn = {"eta": rgb(-0.1, 2, 3), "k": rgb(-0.2, 5, 6), "specular_reflectance": rgb(0.25, 0.5, 1)}
+    metal = material("roughconductor", **worn).bsdf  # spectra as RGB may be below 0
+    assert (value(metal.k), value(metal.reflectance)) == ([0, 5, 6], [0.25, 0.5, 1])
     assert isinstance(material("conductor", specular_reflectance=0.5).bsdf, wf.Mirror)
     glass = material("dielectric", int_ior="diamond", ext_ior="water", specular_transmittance=0.5).bsdf
     assert value(glass.ior) == pytest.approx([2.419 / 1.333])

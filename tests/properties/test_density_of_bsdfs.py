@@ -73,7 +73,7 @@ KINDS = {
     OrenNayar: st.builds(OrenNayar, color, st.floats(0, 1), energy_preserving=st.booleans()),
     Mirror: st.builds(Mirror, color),
     Conductor: st.builds(Conductor, color, st.floats(0.5, 5))
-    | st.builds(Conductor, color, st.floats(0.5, 5), rough, **facets),
+    | st.builds(Conductor, color, st.floats(0.5, 5), rough, reflectance=color, **facets),
     Dielectric: st.builds(Dielectric, index, reflectance=color, transmittance=color)
     | st.builds(Dielectric, index, rough, reflectance=color, transmittance=color, **facets),
     Plastic: st.builds(

@@ -64,6 +64,8 @@ class Conductor(RoughBsdf):
     film_thickness, film_ior
         A clear film on the surface, such as an oxide or oil, whose interference colors the light: thickness
         in nanometers, at most 1e5, 0 for none; and refractive index. See docs/materials.md.
+    reflectance
+        Factor of what is reflected, in [0, 1]: 1 for a metal as it is, a texture for dirt on it.
     multiscatter
         Return what microfacets scatter more than once (E. Turquin 2019, C. Kulla and A. Conty 2017). False is
         the model of single scattering, as in Mitsuba. With F = 1, seen along the normal, that loses 1 % at
@@ -82,6 +84,7 @@ class Conductor(RoughBsdf):
 
     eta = Parameter(partial(color, high=MAX_INDEX, above_zero=True))
     k = Parameter(partial(color, high=MAX_INDEX))
+    reflectance = Parameter(color)
     film_thickness = Parameter(thickness)
     film_ior = Parameter(refractive_index)
 
@@ -98,10 +101,12 @@ class Conductor(RoughBsdf):
         shadowing: Shadowing = "correlated",
         film_thickness: Scalar = 0.0,
         film_ior: Scalar = 1.33,
+        reflectance: Color = 1.0,
         multiscatter: bool = True,
     ) -> None:
         self.eta = eta
         self.k = k
+        self.reflectance = reflectance
         self.film_thickness, self.film_ior = film_thickness, film_ior
         self._set_facets(roughness, roughness_v, rotation, distribution, shadowing, multiscatter)
         self.derive()
@@ -110,6 +115,7 @@ class Conductor(RoughBsdf):
         """Set `specular` from the roughness, whether there is a film, and the mean of constants."""
         super().derive()
         self.has_film = has_film(self.film_thickness)
+        self.is_whole = not isinstance(self.reflectance, BaseTexture) and bool(np.all(self.reflectance == 1))
         varying = any(isinstance(value, BaseTexture) for value in vars(self).values())
         alone = self.specular or varying or not self.multiscatter
         self.mean_reflectance = None if alone else mean_over_cosines(self._fresnel)
@@ -153,6 +159,8 @@ class Conductor(RoughBsdf):
 
     def _fresnel(self, cos: Floats) -> Floats:
         """Return the reflectance per channel, (3, n), with that of a film."""
-        if not self.has_film:
-            return fresnel_conductor(cos, self.eta, self.k)
-        return film_reflectance(cos, self.film_thickness, self.film_ior, f4(1), self.eta, self.k)
+        if self.has_film:
+            found = film_reflectance(cos, self.film_thickness, self.film_ior, f4(1), self.eta, self.k)
+        else:
+            found = fresnel_conductor(cos, self.eta, self.k)
+        return found if self.is_whole else found * self.reflectance

@@ -79,15 +79,14 @@ def _conductor(node: Node, job: Job) -> Material:
             return _named(node, Mirror(tint))
         eta, k = color(node, "eta", 0.0, job), color(node, "k", 1.0, job)
         eta = eta if isinstance(eta, BaseTexture) else np.maximum(eta, LEAST_INDEX)
+        k = k if isinstance(k, BaseTexture) else np.maximum(k, 0)
     else:
         base = name.removesuffix("_palik") if name not in METALS else name
         eta, k = METALS[one_of("material", base, METALS)]
         if base != name:
             node.lose(f"material {name!r}; {base!r} in its place")
         eta = np.maximum(eta, LEAST_INDEX)
-    if isinstance(tint, BaseTexture) or np.any(np.asarray(tint) != 1):
-        node.lose("specular_reflectance")
-    return _named(node, Conductor(eta, k, **facets))
+    return _named(node, Conductor(eta, k, reflectance=tint, **facets))
 
 
 @plugin("twosided", "bsdf", holds="bsdf", harmless="allow_transmission")
