@@ -13,6 +13,7 @@ from wavefront.arrays.state import Paths, SurfaceInteraction
 from wavefront.arrays.vec import broadcast, f4
 from wavefront.guiding import GuideCells, GuideTable
 from wavefront.guiding.octahedral import bins_of, directions_at, neighbors, solid_angles
+from wavefront.guiding.training import SHARES, SIDE, Records, _best_shares, build_table
 from wavefront.integrators import training
 from wavefront.integrators.training import train
 from wavefront.sampling.sampler import Dimension
@@ -151,6 +152,49 @@ def test_cells_are_those_of_a_grid_for_each_axis() -> None:
         step = 8 // side
         expected = ((number * side + x // step) * side + y // step) * side + z // step
         assert (cells.coarser(found, level) == expected)[inside].all()
+
+
+# --- Training -------------------------------------------------------------------------------------
+
+
+def records_of(row: int, density: np.ndarray, share: float, n: int, rng: np.random.Generator) -> Records:
+    """What n directions find of light that is proportional to a mixture of this share."""
+    drawn = 0.5 / density.size + 0.5 * density
+    bins = rng.choice(density.size, n, p=drawn)
+    angles, even = solid_angles(SIDE)[bins], 1 / (4 * np.pi)
+    light = (1 - share) * even + share * density[bins] / angles
+    return Records(np.full(n, row), bins, light, light, drawn[bins] / angles, np.full(n, even))
+
+
+def test_tables_learn_the_light_that_arrives() -> None:
+    """In each cell by itself, from directions that were drawn by another density."""
+    rng = np.random.default_rng(0)
+    at = (np.arange(SIDE) + 0.5) / SIDE * 2 - 1
+    x, y = (v.ravel().astype(f4) for v in np.meshgrid(at, at))
+    axes = np.repeat(np.eye(3), 2, axis=0) * np.array([1, -1] * 3)[:, None]
+    light = (axes @ directions_at(x, y)).clip(0) ** 2 * solid_angles(SIDE)  # smooth, so that bins agree
+    light /= light.sum(1, keepdims=True)
+    found = [records_of(axis, light[axis], 1, 100_000, rng) for axis in range(6)]
+    table = build_table(Records.concatenate(found), LARGE)
+    learned = table.density.reshape(6, -1)[table.row_of] / SIDE**2
+    assert np.abs(learned - light).sum(1) == pytest.approx(0, abs=0.04)
+    few = build_table(records_of(0, light[0], 1, 500, rng), LARGE)
+    assert few.density.reshape(-1, SIDE**2)[few.row_of] / SIDE**2 == pytest.approx(
+        np.tile(solid_angles(SIDE) / (4 * np.pi), (6, 1)), rel=1e-4
+    )
+
+
+def test_the_share_of_a_guide_is_that_of_least_variance() -> None:
+    """Each row has the share that leaves no variance, and one with few records that of most others."""
+    rng = np.random.default_rng(0)
+    contents = rng.exponential(size=(6, SIDE**2)) ** 2
+    contents /= contents.sum(1, keepdims=True)
+    table = GuideTable.of_bins(LARGE, np.arange(6), contents, np.full(6, 0.5))
+    found = [records_of(row, contents[row], share, 20_000, rng) for row, share in enumerate(SHARES)]
+    assert _best_shares(table, Records.concatenate(found)) == pytest.approx(SHARES)
+    most = [records_of(row, contents[row], 0.75, 20_000, rng) for row in range(5)]
+    few = records_of(5, contents[5], 0.0, 5, rng)
+    assert _best_shares(table, Records.concatenate([*most, few])) == pytest.approx(0.75)
 
 
 # --- The mixture ----------------------------------------------------------------------------------
