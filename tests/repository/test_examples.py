@@ -17,6 +17,7 @@ from wavefront.materials import as_material
 EXAMPLES = Path(__file__).parents[2] / "examples"
 SHAPES = {  # the picture of --size 24, (height, width)
     "caustics": (15, 24),
+    "cloud": (18, 24),
     "cornell_box": (24, 24),
     "course_spheres": (24, 24),
     "cuboids": (16, 24),
