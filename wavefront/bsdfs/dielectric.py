@@ -8,7 +8,7 @@ from typing import Self
 import numpy as np
 
 from ..arrays.state import SurfaceInteraction
-from ..arrays.vec import Floats, broadcast, dot, f4
+from ..arrays.vec import BELOW_ONE, Floats, broadcast, dot, f4
 from ..core.errors import one_of
 from ..core.parameter import Parameter
 from ..core.suggestions import suggests_keywords
@@ -187,8 +187,10 @@ class Dielectric(RefractiveBsdf):
         """Return `f`, for radiance, and `pdf` (Walter et al. 2007, eqs. 20 and 21); 0 if smooth."""
         if self.specular:
             return np.zeros_like(wi), np.zeros_like(wi[2])
-        if self._split:
-            return evaluate_channels(self, wo, wi)
+        return evaluate_channels(self, wo, wi) if self._split else self._evaluate_rough(wo, wi)
+
+    def _evaluate_rough(self, wo: Floats, wi: Floats, chance: Floats | None = None) -> tuple[Floats, Floats]:
+        """Evaluate, with the probability (n,) of the lobe of multiple scattering, if it is known."""
         facets = self.facets()
         value, density, cos = facets.mirror_lobe(wo, wi)
         if self.again:
@@ -200,7 +202,7 @@ class Dielectric(RefractiveBsdf):
         pdf = density * reflected + through_density * transmitted
         if not self.again:
             return f, pdf
-        added, spread, chance = self._loss().lobe(self, wo, wi, self.inside)
+        added, spread, chance = self._loss().lobe(self, wo, wi, self.inside, chance)
         tint = np.where(wi[2] < 0, self.transmittance, self.reflectance)
         return f + tint * added, pdf * (f4(1) - chance) + spread * chance
 
@@ -235,15 +237,19 @@ class Dielectric(RefractiveBsdf):
         m = self.facets().visible_normals(wo, u)
         cos = np.maximum(dot(wo, m), f4(0))
         reflected, cos_refracted = fresnel_dielectric(cos, self.eta)
-        choice = u[2]
+        choice, chance = u[2], None
         if self.again:
-            again, spread, choice = self._loss().sample(self, wo, u, self.inside)
+            chance = self._loss().at(self, wo, self.inside)
+            again = choice < chance
+            choice = np.where(again, choice, choice - chance) / np.where(again, chance, f4(1) - chance)
+            choice = np.minimum(choice, BELOW_ONE)
         reflects = choice < reflected
         wi = np.where(reflects, reflect(wo, m), refract(wo, m, cos, cos_refracted, self.eta))
         if self.again:
-            wi = np.where(again, spread, wi)
-            reflects = np.where(again, wi[2] > 0, reflects)
-        f, pdf = self.evaluate(wo, wi)
+            lanes = np.flatnonzero(again)
+            spread = self._loss().directions(self, np.stack([u[0], u[1], choice]), self.inside, lanes)
+            wi[:, lanes], reflects[lanes] = spread, spread[2] > 0
+        f, pdf = self._evaluate_rough(wo, wi, chance)
         # A facet may send light to the wrong side of the surface: no sample.
         pdf = np.where((wi[2] > 0) == reflects, pdf, f4(0))
         eta = np.where(reflects, f4(1), self.eta)

@@ -19,7 +19,7 @@ from typing import TYPE_CHECKING, NamedTuple, TypeAlias
 import numpy as np
 
 from ..arrays.elementary import sin_cos_turns
-from ..arrays.vec import BELOW_ONE, INV_PI, Bools, Doubles, Floats, Ints, dot, f4
+from ..arrays.vec import INV_PI, Bools, Doubles, Floats, Ints, dot, f4
 from ..sampling.warp import cosine_hemisphere
 from .albedo import interpolate
 from .fresnel import fresnel_dielectric
@@ -78,31 +78,27 @@ class Loss(NamedTuple):
         """Return L of directions w (3, n) on the inside or not, (n,)."""
         return _directional(bsdf, self.lost, _place_of_refraction(bsdf.facets(), w), inside)
 
-    def lobe(self, bsdf: RoughBsdf, wo: Floats, wi: Floats, inside: Bools) -> tuple[Floats, Floats, Floats]:
-        """Return value and density, and the probability to sample it, (n,) each, for wo inside or not."""
+    def lobe(
+        self, bsdf: RoughBsdf, wo: Floats, wi: Floats, inside: Bools, chance: Floats | None = None
+    ) -> tuple[Floats, Floats, Floats]:
+        """Return value and density, and the probability to sample it, if it is not known, (n,) each."""
         below = wi[2] < 0
-        chance = self.at(bsdf, wo, inside)
+        chance = self.at(bsdf, wo, inside) if chance is None else chance
         here, beyond, crossing = self._sides(bsdf, inside)
         part = np.where(below, crossing, f4(1) - crossing)
         scale = INV_PI * np.where(inside, f4(self.ior * self.ior), f4(1)) / np.where(below, beyond, here)
         value = chance * self.at(bsdf, wi, inside != below) * part * scale
         return value, bsdf.facets().wide_pdf(wi) * part, chance
 
-    def directions(self, bsdf: RoughBsdf, u: Floats, inside: Bools) -> Floats:
-        """Return directions of the lobe (3, n) for u (3, n) and wo inside or not."""
+    def directions(self, bsdf: RoughBsdf, u: Floats, inside: Bools, lanes: Ints) -> Floats:
+        """Return directions of the lobe (3, k) on some lanes, for u (3, n) and wo inside or not."""
+        crossing = np.broadcast_to(self._sides(bsdf, inside)[2], u[2].shape).take(lanes)
+        u = u.take(lanes, 1)
         second = u[2] >= 0.5
         wi = cosine_hemisphere(u)
-        wi = np.where(second, bsdf.facets().unstretched(wi), wi)
-        wi[2] *= np.where(f4(2) * u[2] - second < self._sides(bsdf, inside)[2], f4(-1), f4(1))
+        wi = np.where(second, bsdf.facets().take(lanes).unstretched(wi), wi)
+        wi[2] *= np.where(f4(2) * u[2] - second < crossing, f4(-1), f4(1))
         return wi
-
-    def sample(self, bsdf: RoughBsdf, wo: Floats, u: Floats, inside: Bools) -> tuple[Bools, Floats, Floats]:
-        """Return where the lobe is chosen by u[2], its directions, and what is left of u[2]."""
-        chance = self.at(bsdf, wo, inside)
-        chosen = u[2] < chance
-        left = np.where(chosen, u[2], u[2] - chance) / np.where(chosen, chance, f4(1) - chance)
-        left = np.minimum(left, BELOW_ONE)
-        return chosen, self.directions(bsdf, np.stack([u[0], u[1], left]), inside), left
 
     def _sides(self, bsdf: RoughBsdf, inside: Bools) -> tuple[Floats, Floats, Floats]:
         """Return the means here and beyond, and the part of the lobe that is beyond the boundary."""

@@ -15,7 +15,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from ..arrays.elementary import exp, sin_cos_turns
-from ..arrays.vec import INV_PI, TINY, Bools, Floats, dot, f4, normalize
+from ..arrays.vec import INV_PI, TINY, Bools, Floats, Ints, dot, f4, normalize
 from ..textures.base import BaseTexture
 
 # Below this α a lobe is narrower than 0.1°, and half vectors of float32 directions no longer
@@ -46,6 +46,13 @@ class Facets(NamedTuple):
     tangent: Floats | None = None  # (2, n) cosine and sine of the tangent's azimuth; None: the x axis
     beckmann: bool = False
     separable: bool = False  # shadowing is independent of masking
+
+    def take(self, lanes: Ints) -> Facets:
+        """Return the facets at some of the points (k,)."""
+        alpha, alpha_v, tangent = (
+            each if each is None or each.shape[-1] == 1 else each.take(lanes, -1) for each in self[:3]
+        )
+        return self._replace(alpha=alpha, alpha_v=alpha_v, tangent=tangent)
 
     def _turned(self, w: Floats) -> Floats:
         """Return directions (3, n) with x along the tangent."""

@@ -233,10 +233,10 @@ class Principled(RoughBsdf):
             wi = np.where(crosses, self._across(wo, wi, m, cos, cos_refracted, index), wi)
             if self._clear_again:
                 left = (u[2] - (facet + coat)) / np.maximum(again, TINY)
-                chosen = (left >= 0) & (left < 1)
-                numbers = np.stack([u[0], u[1], np.where(chosen, left, f4(0))])
-                wi = np.where(chosen, self._loss().directions(self, numbers, self._inside), wi)
-                crosses = np.where(chosen, wi[2] < 0, crosses)
+                lanes = np.flatnonzero((left >= 0) & (left < 1))
+                numbers = np.stack([u[0], u[1], left])
+                wi[:, lanes] = self._loss().directions(self, numbers, self._inside, lanes)
+                crosses[lanes] = wi[2, lanes] < 0
             eta = np.where(crosses, index, f4(1))
         f, pdf = self.evaluate(wo, wi)
         pdf = np.where((wi[2] < 0) == crosses, pdf, f4(0))
