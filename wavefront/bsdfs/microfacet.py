@@ -49,10 +49,12 @@ class Facets(NamedTuple):
 
     def take(self, lanes: Ints) -> Facets:
         """Return the facets at some of the points (k,)."""
-        alpha, alpha_v, tangent = (
-            each if each is None or each.shape[-1] == 1 else each.take(lanes, -1) for each in self[:3]
-        )
-        return self._replace(alpha=alpha, alpha_v=alpha_v, tangent=tangent)
+        varying: dict[str, Any] = {
+            name: value.take(lanes, -1)
+            for name, value in zip(self._fields, self, strict=True)
+            if isinstance(value, np.ndarray) and value.shape[-1] > 1
+        }
+        return self._replace(**varying)
 
     def _turned(self, w: Floats) -> Floats:
         """Return directions (3, n) with x along the tangent."""
