@@ -186,7 +186,7 @@ def test_a_grid_of_albedos_is_a_color() -> None:
 WHITE = {
     "gray": lambda: wf.GridMedium(noise(), BOX, albedo=1),
     "of channels": lambda: wf.GridMedium(np.stack([noise(seed=k) for k in range(3)], -1), BOX, albedo=1),
-    "colored": lambda: wf.GridMedium(noise(), BOX, scattering=(0.5, 1, 2), phase=wf.HenyeyGreenstein(0.7)),
+    "colored": lambda: wf.GridMedium(noise(), BOX, scattering=(0.5, 1, 1.5), phase=wf.HenyeyGreenstein(0.7)),
 }
 
 

@@ -56,12 +56,9 @@ def _colors_or(convert: Any, high: float = FLOAT32_MAX) -> Any:
     return check
 
 
-def _optional_grid(name: str, value: Any) -> Floats | None:
-    return None if value is None else _grid(name, value)
-
-
-def _optional_color(name: str, value: Any) -> Any:
-    return None if value is None else _coefficient(name, value)
+def _optional(convert: Any) -> Any:
+    """Return the check of a parameter that may be None."""
+    return lambda name, value: None if value is None else convert(name, value)
 
 
 def _transform(name: str, value: Any) -> Doubles:
@@ -79,13 +76,9 @@ def _transform(name: str, value: Any) -> Doubles:
     return matrix
 
 
-def _cells(name: str, value: Any) -> int | None:
+def _cells(name: str, value: Any) -> int:
     limit = f"a whole number from 1 to {MOST_CELLS}"
-    return (
-        None
-        if value is None
-        else int(number(name, value, lambda x: x == int(x) and 1 <= x <= MOST_CELLS, limit))
-    )
+    return int(number(name, value, lambda x: x == int(x) and 1 <= x <= MOST_CELLS, limit))
 
 
 class GridMedium(BaseMedium):
@@ -139,9 +132,9 @@ class GridMedium(BaseMedium):
     albedo = Parameter(_colors_or(_albedo, 1.0))
     phase = Parameter(as_phase)
     scale = Parameter(_scale)
-    emission = Parameter(_colors_or(_optional_color))
-    temperature = Parameter(_optional_grid)
-    majorant_cells = Parameter(_cells)
+    emission = Parameter(_colors_or(_optional(_coefficient)))
+    temperature = Parameter(_optional(_grid))
+    majorant_cells = Parameter(_optional(_cells))
     sigma_a: Floats  # (3, 1) absorption where the density is 1, times the scale; without a grid of albedos
     sigma_s: Floats  # (3, 1) scattering, times the part in the grid of albedos
     glow: Floats  # (3, 1) emission where the density is 1
