@@ -17,6 +17,7 @@ KINDS = {
     wf.Rayleigh: st.builds(wf.Rayleigh),
     wf.PhaseMix: st.builds(wf.PhaseMix, PLAIN, PLAIN, st.floats(0.05, 0.95)),
 }
+QUADRATURE = np.polynomial.legendre.leggauss(400)
 kinds = pytest.mark.parametrize("kind", KINDS, ids=lambda kind: kind.__name__)
 
 
@@ -68,7 +69,7 @@ def test_density_of_directions(kind: type[wf.PhaseFunction], data: st.DataObject
 @given(data=st.data())
 def test_densities_integrate_to_one(kind: type[wf.PhaseFunction], data: st.DataObject) -> None:
     phase = data.draw(KINDS[kind])
-    cos, weight = np.polynomial.legendre.leggauss(4000)
+    cos, weight = QUADRATURE
     with doubles():
         assert 2 * np.pi * (weight * phase.p(cos)).sum() == pytest.approx(1, abs=1e-5)
         assert 2 * np.pi * (weight * cos * phase.p(cos)).sum() == pytest.approx(phase.mean_cosine, abs=1e-5)
