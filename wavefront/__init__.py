@@ -101,6 +101,7 @@ if TYPE_CHECKING:
     from .image.comparison import Comparison, compare
     from .io.foreign import from_open3d, from_pyvista
     from .io.load import from_mitsuba, from_trimesh, load, load_mesh
+    from .io.materialx import load_materialx
     from .io.sources import LoadLimits
     from .io.volumes import load_grid
     from .measuring import (
@@ -128,6 +129,7 @@ _LATER = {  # what many programs do without is imported when they ask for it
     ".image.comparison": ("Comparison", "compare"),
     ".io.foreign": ("from_open3d", "from_pyvista"),
     ".io.load": ("from_mitsuba", "from_trimesh", "load", "load_mesh"),
+    ".io.materialx": ("load_materialx",),
     ".io.sources": ("LoadLimits",),
     ".io.volumes": ("load_grid",),
     ".measuring": (
@@ -246,6 +248,7 @@ __all__ = [
     "interpolate_cameras",
     "load",
     "load_grid",
+    "load_materialx",
     "load_mesh",
     "load_points",
     "load_weather",

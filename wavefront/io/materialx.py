@@ -1,0 +1,452 @@
+"""Materials of MaterialX documents, by the library of that name.
+
+A shading node of another kind than OpenPBR's is translated: standard surface by the graph that the library
+brings, glTF's by a table. Graphs of constants and images are evaluated; of others, the input has its default.
+"""
+
+from __future__ import annotations
+
+import operator
+import warnings
+from collections.abc import Callable, Sequence
+from typing import Any
+
+import numpy as np
+
+from ..arrays.vec import f4
+from ..core.errors import SceneError
+from ..core.files import path_name
+from ..materials import Material, OpenPBR
+from ..textures.base import BaseTexture
+from ..textures.image import Texture
+from ..textures.normal_map import NormalMap
+from .pbrt.textures import computed
+from .repair import warn
+from .sources import LoadLimits, PathLike, SceneFiles, checked_limits, folders
+from .xml_checks import look_through
+
+Value = Any  # a number, a color (3,), a text, a texture, or a normal map
+MAX_LINKS = 100  # from an input to an image
+MAX_NODES = 10_000  # of a material, each counted as often as it is referred to
+LEAST_INDEX = 1e-3
+MAX_DEPTH = 32  # of elements in elements
+WRAPS = {"periodic": "repeat", "clamp": "clamp", "mirror": "mirror"}
+NORMALS = ("normalmap", "gltf_normalmap")
+IMAGES = ("image", "tiledimage", "gltf_image", "gltf_colorimage")
+# inputs of OpenPBR that `wf.OpenPBR` does not have
+UNSUPPORTED = (
+    "transmission_dispersion_scale",
+    "coat_roughness_anisotropy",
+    "geometry_coat_normal",
+    "geometry_tangent",
+    "geometry_coat_tangent",
+)
+WITHOUT_EFFECT = (
+    "transmission_dispersion_abbe_number",
+    "subsurface_radius",
+    "subsurface_radius_scale",
+    "subsurface_scatter_anisotropy",
+)
+GLTF = {
+    "base_color": "base_color",
+    "metallic": "base_metalness",
+    "roughness": "specular_roughness",
+    "ior": "specular_ior",
+    "specular": "specular_weight",
+    "specular_color": "specular_color",
+    "transmission": "transmission_weight",
+    "clearcoat": "coat_weight",
+    "clearcoat_roughness": "coat_roughness",
+    "sheen_color": "fuzz_color",
+    "sheen_roughness": "fuzz_roughness",
+    "emissive": "emission_color",
+    "emissive_strength": "emission_luminance",
+    "alpha": "geometry_opacity",
+    "normal": "geometry_normal",
+}
+
+
+def _power(a: Any, b: Any) -> Any:
+    return np.power(np.maximum(a, 0), b)
+
+
+def _mix(fg: Any, bg: Any, amount: Any) -> Any:
+    return bg + (fg - bg) * amount
+
+
+def _if_greater(a: Any, b: Any, yes: Any, no: Any) -> Any:
+    return np.where(a > b, yes, no)
+
+
+def _if_equal(a: Any, b: Any, yes: Any, no: Any) -> Any:
+    return np.where(a == b, yes, no)
+
+
+def _same(value: Any) -> Any:
+    return value
+
+
+# functions of each channel, and the names of their arguments
+FUNCTIONS: dict[str, tuple[Callable[..., Any], tuple[str, ...]]] = {
+    "add": (operator.add, ("in1", "in2")),
+    "subtract": (operator.sub, ("in1", "in2")),
+    "multiply": (operator.mul, ("in1", "in2")),
+    "divide": (operator.truediv, ("in1", "in2")),
+    "power": (_power, ("in1", "in2")),
+    "min": (np.minimum, ("in1", "in2")),
+    "max": (np.maximum, ("in1", "in2")),
+    "clamp": (np.clip, ("in", "low", "high")),
+    "invert": (operator.sub, ("amount", "in")),
+    "mix": (_mix, ("fg", "bg", "mix")),
+    "ifgreater": (_if_greater, ("value1", "value2", "in1", "in2")),
+    "ifequal": (_if_equal, ("value1", "value2", "in1", "in2")),
+    "dot": (_same, ("in",)),
+    "constant": (_same, ("value",)),
+}
+
+
+class Lost(Exception):
+    """A node that is not supported."""
+
+
+def load_materialx(
+    path: PathLike,
+    *,
+    strict: bool = False,
+    limits: LoadLimits | None = None,
+    search_paths: PathLike | Sequence[PathLike] = (),
+) -> dict[str, Material]:
+    """Read the materials of a MaterialX document (.mtlx). It needs `pip install materialx`.
+
+    Surfaces of OpenPBR, standard surface and glTF become `OpenPBR`. Their inputs may be constants, images,
+    normal maps, and sums, products and the like of these. What is not honored is one warning, which names
+    materials, inputs and nodes.
+
+    Parameters
+    ----------
+    path
+        The file. Images are read only from its own folder, and folders below it.
+    strict
+        Raise an error in place of the warning.
+    limits, search_paths
+        As for `load`.
+
+    Returns
+    -------
+    dict
+        The materials by name, in the order of the file.
+
+    Raises
+    ------
+    SceneError
+        If the file or an image cannot be read, or a material has a value out of range.
+    ImportError
+        If the library is not installed.
+
+    Examples
+    --------
+    >>> from importlib.util import find_spec
+    >>> with open("clay.mtlx", "w") as file:
+    ...     _ = file.write('''<materialx version="1.39">
+    ...         <open_pbr_surface name="S" type="surfaceshader">
+    ...           <input name="base_color" type="color3" value="0.5, 0.2, 0.1"/>
+    ...         </open_pbr_surface>
+    ...         <surfacematerial name="clay" type="material">
+    ...           <input name="surfaceshader" type="surfaceshader" nodename="S"/>
+    ...         </surfacematerial>
+    ...       </materialx>''')
+    >>> if find_spec("MaterialX"):
+    ...     ball = wf.Sphere((0, 0, 0), 1, material=wf.load_materialx("clay.mtlx")["clay"])
+    """
+    name, files = path_name(path), SceneFiles(path, folders(search_paths), checked_limits(limits))
+    try:
+        import MaterialX
+    except ImportError as error:
+        raise ImportError("MaterialX documents need materialx: pip install materialx") from error
+    data, lost = files.read(path), dict[str, None]()
+    _check(name, data, lost)
+    document = _Document(MaterialX, name, data, files, lost)
+    try:
+        materials = {node.getName(): document.material(node) for node in document.materials()}
+    except SceneError as error:
+        raise error if str(error).startswith(name) else SceneError(f"{name}: {error}") from error
+    except (RuntimeError, TypeError, UnicodeDecodeError, LookupError) as error:  # of the library
+        raise SceneError(f"{name}: not a readable MaterialX document: {error}") from error
+    if not materials:
+        raise SceneError(f"{name}: has no materials{'; not followed: ' * bool(lost)}{'; '.join(lost)}")
+    if lost:
+        warn(f"{name}: not honored: {'; '.join(lost)}", strict)
+    return materials
+
+
+def _check(name: str, data: bytes, lost: dict[str, None]) -> None:
+    """Refuse what is no MaterialX document before the library reads it."""
+    depth = 0
+
+    def begin(tag: str, attributes: dict[str, str], at: int) -> None:
+        nonlocal depth
+        depth += 1
+        if depth == 1 and tag != "materialx":
+            raise SceneError(f"{name}: its root is <{tag}>, not <materialx>")
+        if depth > MAX_DEPTH:
+            raise SceneError(f"{name}: its elements are nested deeper than {MAX_DEPTH}")
+        if tag == "include":
+            lost[f"the include of {attributes.get('href', '')!r}"] = None
+
+    def end(tag: str, at: int) -> None:
+        nonlocal depth
+        depth -= 1
+
+    look_through(name, data, begin, end)
+
+
+class _Document:
+    """A document of the library, and the conversion of its materials."""
+
+    def __init__(
+        self, library: Any, name: str, data: bytes, files: SceneFiles, lost: dict[str, None]
+    ) -> None:
+        self.library, self.name, self.files, self.lost = library, name, files, lost
+        self.standard = library.createDocument()
+        folder = library.getDefaultDataSearchPath()
+        library.loadLibraries(library.getDefaultDataLibraryFolders(), folder, self.standard)
+        self.document = library.createDocument()
+        options = library.XmlReadOptions()
+        options.readXIncludeFunction = None
+        try:
+            library.readFromXmlString(self.document, data.decode(), readOptions=options)
+        except (library.Exception, RuntimeError, UnicodeDecodeError) as error:
+            raise SceneError(f"{name}: not a readable MaterialX document: {error}") from error
+        self.document.setDataLibrary(self.standard)
+        self.nodes = 0
+
+    def materials(self) -> list[Any]:
+        """Return the nodes of all materials."""
+        return [node for node in self.document.getMaterialNodes() if node.getCategory() == "surfacematerial"]
+
+    def material(self, node: Any) -> Material:
+        """Return the material of a node."""
+        self.nodes = 0
+        title, shaders = node.getName(), self.library.getShaderNodes(node)
+        shader: Any = shaders[0] if shaders else None
+        kind = None if shader is None else shader.getCategory()
+        definition: Any = None if shader is None else shader.getNodeDef()
+        if definition is None or kind not in ("open_pbr_surface", "standard_surface", "gltf_pbr"):
+            self._lose(title, "surfaceshader", kind or "no node")
+            return OpenPBR(name=title)
+        if node.getInput("displacementshader") is not None:
+            self._lose(title, "displacementshader", "displacement")
+        inputs = {each.getName(): self._input(title, shader, each) for each in definition.getActiveInputs()}
+        if kind == "standard_surface":
+            inputs = self._translated(title, inputs)
+        if kind == "gltf_pbr":
+            inputs = self._of_gltf(title, inputs)
+        return self._made(title, inputs)
+
+    def _made(self, title: str, inputs: dict[str, Value]) -> Material:
+        for name in UNSUPPORTED:
+            value = inputs.pop(name, None)
+            if value is not None and np.any(np.not_equal(value, 0)):
+                self._lose(title, name, "")
+        given = {name: value for name, value in inputs.items() if value is not None}
+        for name in WITHOUT_EFFECT:
+            given.pop(name, None)
+        if not isinstance(given.get("geometry_normal"), NormalMap):
+            given.pop("geometry_normal", None)
+        if not isinstance(given["specular_ior"], BaseTexture):  # 0 is allowed there
+            given["specular_ior"] = max(float(given["specular_ior"]), LEAST_INDEX)
+        if "geometry_thin_walled" in given:
+            given["geometry_thin_walled"] = bool(given["geometry_thin_walled"])
+        with warnings.catch_warnings(record=True) as said:
+            warnings.simplefilter("always")
+            try:
+                made = OpenPBR(**given, name=title)
+            except SceneError as error:
+                raise SceneError(f"{self.name}: material {title!r}: {error}") from error
+        self.lost.update(dict.fromkeys(f"{title}: {each.message}" for each in said))
+        return made
+
+    def _translated(self, title: str, inputs: dict[str, Value]) -> dict[str, Value]:
+        """Return the inputs of OpenPBR for those of standard surface, by the library's graph."""
+        graph = self.standard.getNodeGraph("NG_standard_surface_to_open_pbr_surface")
+        made = {}
+        for output in graph.getOutputs():
+            name = output.getName().removesuffix("_out")
+            try:
+                made[name] = self._node(output.getConnectedNode(), "", inputs, 0)
+            except Lost as error:
+                self._lose(title, name, str(error))
+        made["geometry_normal"] = inputs["normal"]
+        for name in ("specular_rotation", "coat_rotation", "transmission_extra_roughness"):
+            if np.any(np.not_equal(inputs[name], 0)):
+                self._lose(title, name, "")
+        return made
+
+    def _of_gltf(self, title: str, inputs: dict[str, Value]) -> dict[str, Value]:
+        """Return the inputs of OpenPBR for those of glTF's surface."""
+        made = {other: inputs[name] for name, other in GLTF.items()}
+        if inputs["alpha_mode"] == 0:
+            made["geometry_opacity"] = 1.0
+        elif inputs["alpha_mode"] == 1:
+            parts = [made["geometry_opacity"], inputs["alpha_cutoff"], 1.0, 0.0]
+            made["geometry_opacity"] = _combined(_if_greater, parts)
+        cloth = isinstance(made["fuzz_color"], BaseTexture) or np.any(made["fuzz_color"])
+        made["fuzz_weight"] = 1.0 if cloth else 0.0
+        distance = inputs["attenuation_distance"]
+        if inputs["thickness"] and 0 < distance < np.inf:
+            made |= {"transmission_depth": distance, "transmission_color": inputs["attenuation_color"]}
+        else:
+            made["transmission_color"] = made["base_color"]
+        for name in ("iridescence", "dispersion", "anisotropy_strength"):
+            if np.any(np.not_equal(inputs.get(name, 0) or 0, 0)):
+                self._lose(title, name, "")
+        return made
+
+    def _input(self, title: str, shader: Any, declared: Any) -> Value:
+        """Return the value of an input of a shader, by default the declared one; None if it has none."""
+        default, given = _plain(declared), shader.getInput(declared.getName())
+        if given is None:
+            return default
+        try:
+            return self._value(given, declared.getType(), {}, 0)
+        except Lost as error:
+            self._lose(title, declared.getName(), str(error))
+            return default
+
+    def _value(self, given: Any, kind: str, interface: dict[str, Value], depth: int) -> Value:
+        """Return the value of an input: of a node, of the interface of its graph, or its own."""
+        if depth > MAX_LINKS:
+            raise Lost("nodes that lead to each other")
+        if given.getInterfaceName() in interface:
+            return interface[given.getInterfaceName()]
+        if given.getInterfaceName() and (source := given.getInterfaceInput()) is not None:
+            return self._value(source, kind, interface, depth + 1)
+        node = given.getConnectedNode()
+        if node is not None:
+            source = given if given.getNodeName() else given.getConnectedOutput()
+            return self._node(node, source.getOutputString(), interface, depth + 1, kind)
+        if given.getNodeName() or given.getNodeGraphString() or given.getOutputString():
+            raise Lost("a node that does not exist")
+        if (value := _plain(given)) is None:
+            raise Lost("an input without a value")
+        return value
+
+    def _node(self, node: Any, output: str, interface: dict[str, Value], depth: int, kind: str = "") -> Value:
+        """Return the value of a node, of a type where the input has another than the node."""
+        if node is None:
+            raise Lost("a node that does not exist")
+        self.nodes += 1
+        if self.nodes > MAX_NODES:
+            raise SceneError(f"{self.name}: a material refers to nodes more than {MAX_NODES} times")
+        kind, category = kind or node.getType(), node.getCategory()
+        named = f"{category} {node.getName()!r}"
+
+        def value(name: str) -> Value:
+            given, definition = node.getInput(name), node.getNodeDef()
+            declared = None if definition is None else definition.getActiveInput(name)
+            if given is None and declared is None:
+                raise Lost(f"{named} without {name!r}")
+            if given is None:
+                return _plain(declared)
+            return self._value(given, given.getType(), interface, depth)
+
+        try:
+            if category in NORMALS:
+                return self._normal(node, category, value)
+            if category in IMAGES:
+                channel = 3 if output == "outa" else 0 if kind == "float" else None
+                return self._image(node, channel, value)
+            if category == "separate3":
+                source = node.getInput("in").getConnectedNode()
+                if source is None or source.getCategory() not in IMAGES:
+                    raise Lost(named)
+                channel = {"outx": 0, "outr": 0, "outy": 1, "outg": 1, "outz": 2, "outb": 2}[output]
+                return self._image(source, channel, lambda name: _plain(source.getInput(name)))
+            if category in FUNCTIONS:
+                function, names = FUNCTIONS[category]
+                return _combined(function, [value(name) for name in names])
+            if category == "convert":
+                return _converted(value("in"), kind, named)
+            if category == "dotproduct":
+                return float(np.dot(_number(value("in1")), _number(value("in2"))))
+            if category == "extract":
+                return float(_number(value("in"))[int(value("index"))])
+        except (ValueError, IndexError, TypeError, AttributeError, ArithmeticError) as error:
+            if isinstance(error, SceneError):
+                raise
+            raise Lost(f"{named}: {error}") from error
+        raise Lost(named)
+
+    def _image(self, node: Any, channel: int | None, value: Callable[[str], Value]) -> Texture:
+        file = node.getInput("file")
+        reference = "" if file is None else file.getResolvedValueString()
+        space = "" if file is None else file.getActiveColorSpace()
+        if not reference or space not in ("", "none", "raw", "lin_rec709", "srgb_texture", "Utility - Raw"):
+            raise Lost(f"{node.getCategory()} {node.getName()!r} of color space {space!r}")
+        if (texcoord := node.getInput("texcoord")) is not None and texcoord.getConnectedNode() is not None:
+            where = texcoord.getConnectedNode()
+            if where.getCategory() != "texcoord" or where.getInput("index") is not None:
+                raise Lost(f"{where.getCategory()} {where.getName()!r}")
+        pixels = self.files.image(self.files.find(reference))
+        if channel is not None and channel >= pixels.shape[2]:
+            channel = 0
+        tiled = node.getCategory() == "tiledimage"
+        (u, v), (du, dv) = (value("uvtiling"), value("uvoffset")) if tiled else ((1, 1), (0, 0))
+        transform = None if (u, v, du, dv) == (1, 1, 0, 0) else [[u, 0, -du], [0, v, -dv], [0, 0, 1]]
+        modes = [node.getInput(name) for name in ("uaddressmode", "vaddressmode")]
+        wraps = [WRAPS.get("periodic" if each is None else each.getValueString()) for each in modes]
+        if None in wraps:
+            raise Lost(f"image {node.getName()!r} with a constant outside")
+        closest = (mode := node.getInput("filtertype")) is not None and mode.getValueString() == "closest"
+        return Texture(
+            pixels,
+            srgb=space == "srgb_texture",
+            wrap=tuple(wraps),  # type: ignore[arg-type]
+            filter="nearest" if closest else "bilinear",
+            transform=transform,
+            channel=channel,
+        )
+
+    def _normal(self, node: Any, category: str, value: Callable[[str], Value]) -> NormalMap:
+        image = self._image(node, None, value) if category == "gltf_normalmap" else value("in")
+        if not isinstance(image, Texture):
+            raise Lost(f"normalmap {node.getName()!r}")
+        scale = np.ravel(value("scale")) if category == "normalmap" else np.ones(1)
+        return NormalMap(image, float(scale[0]))
+
+    def _lose(self, material: str, name: str, what: str) -> None:
+        self.lost[f"{material}: {name}{f' by {what}' if what else ''}"] = None
+
+
+def _plain(given: Any) -> Value:
+    """Return the constant of an input: a number, a text, or a tuple of numbers; None if it has none."""
+    value = given.getValue()
+    if value is None or isinstance(value, str | bool | int | float):
+        if given.getType() in ("float", "color3") and not isinstance(value, float | None):
+            raise Lost(f"a {given.getType()} that is {value!r}")
+        return value
+    return tuple(float(each) for each in value)
+
+
+def _number(value: Value) -> Any:
+    """Return a constant as an array of numbers."""
+    if isinstance(value, BaseTexture):
+        raise Lost("images")
+    return np.ravel(np.asarray(value, f4))
+
+
+def _combined(function: Callable[..., Any], parts: list[Value]) -> Value:
+    """Return a function of numbers, colors and textures."""
+    textures = [part for part in parts if isinstance(part, BaseTexture)]
+    known = [part if isinstance(part, BaseTexture) else np.asarray(part, f4) for part in parts]
+    ones = all(np.all(part == 1) for part in known if not isinstance(part, BaseTexture))
+    if function is operator.mul and len(textures) == 1 and ones:  # a texture keeps what is known of it
+        return textures[0]
+    return parts[0] if function is _same else computed(function, *known, rising=False)
+
+
+def _converted(value: Value, kind: str, named: str) -> Value:
+    """Return a number or a color as a type."""
+    if isinstance(value, BaseTexture) or np.ndim(value) or kind == "float":
+        return value
+    return np.full(2 if kind == "vector2" else 3, value, f4)
