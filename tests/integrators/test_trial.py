@@ -248,6 +248,29 @@ def test_sharing_must_be_better_than_branches(
     assert (found.reuse, found.branches) == (reuse, 1 if reuse else 2)
 
 
+@pytest.mark.parametrize(("build", "reuse"), [(cornell_box, True), (glossy, False)], ids=["matte", "glossy"])
+@pytest.mark.parametrize(("noisy", "may_pay"), [(6, True), (4800, False)], ids=["few pixels", "all pixels"])
+def test_sharing_is_taken_in_matte_rooms_where_few_pixels_would_decide(
+    build: Callable[[tuple[int, int]], wf.Scene],
+    reuse: bool,
+    noisy: int,
+    may_pay: bool,
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """A cost of 0.95 with a large error: others of these pixels would tell something else."""
+    pretend(monkeypatch, {PLAIN: 0.1, SHARED: 0.095})
+    found = Trial._render
+
+    def noisy_in_few(self: Trial, *setting: Any) -> Run:
+        run, variance = found(self, *setting), np.zeros(4800)
+        variance[:: 4800 // noisy] = run.variance[0]
+        return replace(run, variance=np.roll(variance, 500 * setting[1]))
+
+    monkeypatch.setattr(Trial, "_render", noisy_in_few)
+    monkeypatch.setattr(choice, "OUTLIERS_OF_SHARED", 0)
+    assert chosen(build(SIZE)).reuse is (reuse and may_pay)
+
+
 @pytest.mark.parametrize(
     ("variance", "shared", "reuse"), [(0.1, 0.45, True), (0.1, 0.6, False), (2, 0.6, True)]
 )
@@ -428,6 +451,20 @@ def test_the_variance_is_that_between_blocks(monkeypatch: pytest.MonkeyPatch) ->
         assert run.mean_variance(0.01) == pytest.approx(deviation**2 / scale, rel=0.1)
         assert run.mean_variance(0) > 0.3
     assert runs[1].cost(runs[0], 0.01) == pytest.approx(8, rel=0.1)
+
+
+def test_the_error_of_a_cost() -> None:
+    """That of a quotient of means, as over many runs."""
+    random = np.random.default_rng(0)
+
+    def run(mean: float) -> Run:
+        return Run(random.exponential(mean, 576), 2.0, np.zeros(1, np.intp), 1)
+
+    pairs = [(run(2), run(1)) for _ in range(300)]
+    costs, errors = ([getattr(a, name)(b, 0) for a, b in pairs] for name in ("cost", "cost_error"))
+    assert np.std(costs) == pytest.approx(2 * (2 / 576) ** 0.5, rel=0.15)
+    assert np.sqrt(np.mean(np.square(errors))) == pytest.approx(np.std(costs), rel=0.15)
+    assert pairs[0][0].cost_error(replace(pairs[0][1], variance=np.zeros(576)), 0) == 0
 
 
 def test_a_guide_is_used_where_it_pays() -> None:

@@ -11,6 +11,7 @@ from __future__ import annotations
 
 import itertools
 import math
+import statistics
 from collections.abc import Callable, Iterable
 from dataclasses import replace
 from typing import TypeAlias
@@ -34,12 +35,13 @@ from .registry import integrator_for
 from .training import spread
 
 BLOCKS, SAMPLES = 4, 4  # of each pixel: blocks of samples, which are stratified as those of a picture are
-MOST_TILES = 256
+MOST_TILES = 100  # more tell little more, and take time in large pictures
 PIXELS_PER_TILE = 1024  # of the picture, as long as there are not more tiles: a quarter of a path for each
 TILES_AT_ONCE = 64  # that are traced together, at most
 LEAST_JOBS = 2  # so that two workers have something to do, if there are as many
 MOST_BRANCHES = 4  # more gain nothing
 BOUNCES = 6  # at most: few paths get further, and a wave of few costs as much as one of many
+GROUPS = 12  # of tiles, each of which is left out in turn to tell the error of a cost
 FLOOR = 0.01  # of the squared mean of all pixels, added to that of each
 # Costs relative to a ray that finds the nearest surface, which is shaded then. Few bits, for exact sums.
 SHADOW_RAY = 0.5  # of one that finds out only whether something is in its way
@@ -119,20 +121,29 @@ class SecondPoints(PathRecorder):
 class Run:
     """What a setting has brought."""
 
-    variance: Doubles  # of pixels of four samples, relative to the squared mean around each, rising
+    variance: Doubles  # of pixels of four samples, relative to the squared mean around each
     rays: float
     met: Ints  # as of `TrialPart`
     paths: int  # from the camera
 
     def mean_variance(self, outliers: float) -> float:
         """Return the mean variance of the pixels without this part of them, the noisiest."""
-        kept = self.variance[: self.variance.size - int(outliers * self.variance.size)]
+        kept = np.sort(self.variance)[: self.variance.size - int(outliers * self.variance.size)]
         return math.fsum(kept) / kept.size
 
     def cost(self, than: Run, outliers: float) -> float:
         """Return variance times rays over that of another run; 1 where that has no variance."""
         least = than.mean_variance(outliers) * than.rays
         return self.mean_variance(outliers) * self.rays / least if least > 0 else 1.0
+
+    def cost_error(self, than: Run, outliers: float) -> float:
+        """Return the standard error of a cost, by the jackknife (B. Efron, 1982) over groups of tiles."""
+        group = np.arange(self.variance.size) * GROUPS // self.variance.size
+        costs = []
+        for left_out in range(GROUPS):
+            one, other = (replace(run, variance=run.variance[group != left_out]) for run in (self, than))
+            costs.append(one.cost(other, outliers))
+        return math.sqrt((GROUPS - 1) * statistics.pvariance(costs))
 
 
 class Trial:
@@ -204,4 +215,4 @@ class Trial:
         deviation = (radiance - mean) * math.sqrt(BLOCKS / (BLOCKS - 1))
         variance = (np.square(deviation) / self._scale).mean((0, 1))
         rays, met = sum(part.rays for part in found), np.sum([part.met for part in found], 0)
-        return Run(np.sort(variance, axis=None), rays, met, variance.size * BLOCKS * SAMPLES)
+        return Run(variance, rays, met, variance.size * BLOCKS * SAMPLES)

@@ -107,9 +107,12 @@ def _tried(settings: Settings, scene: CompiledScene, camera: Camera, trial: Tria
     if cost < CLEAR_GAIN:
         return shared
     branched = plain if light_is_rare else _branched(settings, trial, plain)
-    limit = GAIN if shares_all(scene) or light_is_rare else GAIN_BESIDE_GLOSS
-    better = _cost(trial, shared, branched, OUTLIERS_OF_SHARED) < GAIN
-    return shared if better and cost < limit else branched
+    over_branched = _cost(trial, shared, branched, OUTLIERS_OF_SHARED)
+    if shares_all(scene):  # a few noisy pixels, which the trial may miss, are what sharing gains most in
+        error = _run(trial, shared).cost_error(_run(trial, branched), OUTLIERS_OF_SHARED)
+        return shared if over_branched - error < GAIN else branched
+    limit = GAIN if light_is_rare else GAIN_BESIDE_GLOSS
+    return shared if over_branched < GAIN and cost < limit else branched
 
 
 def _may_gain(scene: CompiledScene, found: Run, light_is_rare: bool) -> bool:
@@ -133,8 +136,12 @@ def _branched(settings: Settings, trial: Trial, choice: Choice) -> Choice:
 
 def _cost(trial: Trial, one: Choice, other: Choice, outliers: float = OUTLIERS) -> float:
     """Return variance times rays of a choice over that of another."""
-    first, second = (trial.run(each.branches, each.reuse, each.guided) for each in (one, other))
-    return first.cost(second, outliers)
+    return _run(trial, one).cost(_run(trial, other), outliers)
+
+
+def _run(trial: Trial, choice: Choice) -> Run:
+    """Return the run of a choice."""
+    return trial.run(choice.branches, choice.reuse, choice.guided)
 
 
 def _tries_something(settings: Settings, scene: CompiledScene, camera: Camera) -> bool:
