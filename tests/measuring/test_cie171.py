@@ -37,11 +37,11 @@ def test_tables_under_one_sky(name: str, type: int) -> None:
 @pytest.mark.slow
 @pytest.mark.parametrize("name", [*CASES, *TABLES])
 def test_to_a_small_error(name: str) -> None:
-    """And a difference of two per cent would be seen."""
+    """And a difference of three per cent would be seen."""
     found = CASES[name](1 << 17) if name in CASES else TABLES[name].run(1 << 14)
-    check(found, 0.004)
+    check(found, 0.02)
     with pytest.raises(AssertionError, match="standard errors"):
-        check(replace(found, value=found.value * 1.02), 0.004)
+        check(replace(found, value=found.value * 1.03), 0.02)
 
 
 @pytest.mark.parametrize("name", TABLES)
