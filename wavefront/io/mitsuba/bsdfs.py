@@ -215,7 +215,7 @@ def _index_of_reflectance(node: Node, job: Job) -> dict[str, Any]:
     """Return the index that eta gives, or specular, which is the normal reflectance over 0.08."""
     if "eta" in node.values:
         return {"ior": node.number("eta", 1.5)}
-    part = number("specular", node.get("specular", 0.5), lambda x: 0 <= x <= 1, "in [0, 1]")
+    part = node.number("specular", 0.5, lambda x: 0 <= x <= 1, "in [0, 1]")
     root = np.sqrt(0.08 * part)
     return {"ior": float((1 + root) / (1 - root))}
 

@@ -99,20 +99,15 @@ class Node:
             raise KeyError(f"{self.plugin} does not read {name}")
         return self.values.get(name, default)
 
-    def number(self, name: str, default: float) -> float:
+    def number(self, name: str, default: float, holds: Any = None, limit: str = "") -> float:
         """Return a number."""
-        return number(name, self.get(name, default))
+        value = self.get(name, default)
+        return number(name, value) if holds is None else number(name, value, holds, limit)
 
     def whole(self, name: str, default: int, least: int = 0, most: int = 2**31) -> int:
         """Return a whole number."""
-        return int(
-            number(
-                name,
-                self.get(name, default),
-                lambda x: x == int(x) and least <= x <= most,
-                f"a whole number from {least} to {most}",
-            )
-        )
+        limit = f"a whole number from {least} to {most}"
+        return int(self.number(name, default, lambda x: x == int(x) and least <= x <= most, limit))
 
     def flag(self, name: str, default: bool = False) -> bool:
         """Return True or False."""

@@ -12,7 +12,6 @@ from ...arrays.elementary import sin_cos_turns
 from ...arrays.vec import Doubles, Ints
 from ...bsdfs import Diffuse, Sides
 from ...core.errors import SceneError
-from ...core.errors import number as checked_number
 from ...materials import Material
 from ...shapes import Cylinders, Instance, Mesh, Shape, Sphere
 from ...shapes.transform import Matrix
@@ -74,7 +73,7 @@ def _disk(node: Node, job: Job) -> list[Shape]:
 )
 def _cylinder(node: Node, job: Job) -> list[Shape]:
     start, end = node.vector("p0", (0, 0, 0)), node.vector("p1", (0, 0, 1))
-    radius = checked_number("radius", node.get("radius", 1.0), lambda x: x > 0, "above 0")
+    radius = node.number("radius", 1.0, lambda x: x > 0, "above 0")
     if not (end - start).any():
         raise SceneError(f"p0 and p1 are both {start.tolist()}")
     axes, matrix = frame(end - start), node.matrix()
@@ -105,7 +104,7 @@ def _cylinder(node: Node, job: Job) -> list[Shape]:
 )
 def _sphere(node: Node, job: Job) -> list[Shape]:
     center = node.vector("center", (0, 0, 0))
-    radius = checked_number("radius", node.get("radius", 1.0), lambda x: x > 0, "above 0")
+    radius = node.number("radius", 1.0, lambda x: x > 0, "above 0")
     matrix = node.matrix()
     scale = np.linalg.svd(matrix[:3, :3], compute_uv=False)
     if scale[0] - scale[2] > ROUND * scale[0]:

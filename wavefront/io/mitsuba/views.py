@@ -145,9 +145,7 @@ def _integrator(node: Node, job: Job) -> Settings:
         return dict(job.convert(job.only(node, "integrator")))
     settings: Settings = {"max_bounces": 1}
     if node.plugin != "direct":
-        depth = number(
-            "max_depth", node.get("max_depth", -1), lambda x: x == int(x) >= -1, "at least 0, or -1"
-        )
+        depth = node.number("max_depth", -1, lambda x: x == int(x) >= -1, "at least 0, or -1")
         settings["max_bounces"] = min(int(depth) - 1, ENDLESS) if depth > 0 else ENDLESS
         settings["roulette"] = node.whole("rr_depth", 5, 1)
         if depth == 0:
@@ -203,7 +201,7 @@ def _field_of_view(node: Node, aspect: float) -> float:
     if "fov" in node.values:
         if "focal_length" in node.values:
             raise SceneError("has fov and focal_length; give one of them")
-        angle = number("fov", node.get("fov"), lambda x: 0 < x < 180, "above 0 and below 180 degrees")
+        angle = node.number("fov", 0, lambda x: 0 < x < 180, "above 0 and below 180 degrees")
         axis = node.choice("fov_axis", "x", ("x", "y", "diagonal", "smaller", "larger"))
     else:
         (length,) = numbers("", "focal_length", node.text("focal_length", "50mm").removesuffix("mm"), (1,))
