@@ -14,6 +14,7 @@ from measurements import adaptive_fields, tensor_file
 import wavefront as wf
 from wavefront.codecs.images import write_image
 from wavefront.colors.spectrum import spectrum_rgb
+from wavefront.io.losses import Losses
 from wavefront.io.mitsuba import convert as _  # noqa: F401  fills the table
 from wavefront.io.mitsuba.nodes import PLUGINS, Node
 
@@ -875,7 +876,7 @@ def test_the_table_says_what_is_read(monkeypatch: pytest.MonkeyPatch) -> None:
 
     monkeypatch.setattr(Node, "get", noting)
     with pytest.raises(KeyError, match="does not read"):
-        noting(Node("sphere", "", "", {}, {}), "softness")
+        noting(Node("sphere", "", "", {}, Losses()), "softness")
     ball = wf.from_mitsuba({"type": "scene", "ball": {"type": "sphere", "center": [0, 0, 1]}}).shapes[0]
     assert {name for plugin, name in read if plugin == "sphere"} - {"softness"} == set(
         PLUGINS["sphere"].reads

@@ -48,7 +48,7 @@ def convert(
     """
     job = Job(name, files, find, read_mesh, strict)
     made: Scene = job.convert(Graph(name, job.lost).build(scene))
-    job.report()
+    job.lost.report(name, strict)
     return made
 
 

@@ -15,8 +15,9 @@ from ...core.suggestions import did_you_mean
 from ...materials import Material
 from ...media import Isotropic
 from ...shapes.transform import Matrix
+from ..losses import Losses
 from ..placing import in_range
-from ..repair import RawMesh, warn
+from ..repair import RawMesh
 from ..sources import SceneFiles
 from ..xml_checks import MAX_DEPTH
 
@@ -81,7 +82,7 @@ class Node:
     id: str
     label: str  # where it is, and what, for messages
     values: dict[str, Any]
-    lost: dict[str, None]  # what is not honored, of all plugins
+    lost: Losses  # of all plugins
     size: int = 1  # plugins in it
 
     @property
@@ -91,7 +92,7 @@ class Node:
 
     def lose(self, what: str) -> None:
         """Note something that is not honored."""
-        self.lost[f"{self.label}: {what}"] = None
+        self.lost.note(f"{self.label}: {what}")
 
     def get(self, name: str, default: Any = None) -> Any:
         """Return a parameter, which the table must say is read."""
@@ -153,7 +154,7 @@ class Job:
     find: Callable[[str], Path]  # the path of a file that the scene names
     read_mesh: Callable[[Path], list[RawMesh]]
     strict: bool
-    lost: dict[str, None] = field(default_factory=dict)
+    lost: Losses = field(default_factory=Losses)
     made: dict[Any, Any] = field(default_factory=dict)  # what was converted already
     eye: np.ndarray | None = None  # where the camera stands
     said: str = ""  # the message of an error that names its place
@@ -183,12 +184,6 @@ class Job:
             raise SceneError(f"{node.label} holds no {kind}")
         return held[0]
 
-    def report(self) -> None:
-        """Warn of all that is not honored."""
-        if self.lost:
-            lines = (each.removeprefix(self.name).lstrip(", ") for each in self.lost)
-            warn(f"{self.name}: not honored: {'; '.join(lines)}", self.strict)
-
     def _converted(self, node: Node) -> Any:
         entry = PLUGINS[node.plugin]
         if entry.convert is None:
@@ -217,7 +212,7 @@ class Graph:
         As of `Node`.
     """
 
-    def __init__(self, name: str, lost: dict[str, None]) -> None:
+    def __init__(self, name: str, lost: Losses) -> None:
         self._name, self._lost = name, lost
         self._ids: dict[str, Mapping[str, Any]] = {}
         self._nodes: dict[int, Node] = {}

@@ -16,7 +16,8 @@ from ...core.errors import SceneError, in_brief, number, one_of
 from ...core.suggestions import did_you_mean
 from ...materials import Material
 from ...shapes.transform import Matrix
-from ..repair import RawMesh, warn
+from ..losses import Losses
+from ..repair import RawMesh
 from ..sources import SceneFiles
 from ..spectra import METALS, read_spectrum
 from .parser import NUMBERS, Parameter, placed
@@ -78,7 +79,7 @@ class Entity:
     type: str
     place: str  # file and line
     values: dict[str, Parameter]
-    lost: dict[tuple[str, str], None]  # place of what is not honored, and what it is, of all entities
+    lost: Losses  # of all entities
     matrix: Matrix = field(default_factory=lambda: np.eye(4))  # to the world, where it was stated
     state: Any = None  # the graphics state of a shape
     unread: set[str] = field(default_factory=set)
@@ -95,7 +96,7 @@ class Entity:
 
     def lose(self, what: str) -> None:
         """Note something that is not honored."""
-        self.lost[self.place, f"{self._what}: {what}"] = None
+        self.lost.note(f"{self._what}: {what}", self.place)
 
     def get(self, name: str, types: tuple[str, ...]) -> Any:
         """Return the values of a parameter, which must be of one of some types; None if it is absent."""
@@ -203,7 +204,7 @@ class Job:
     files: SceneFiles
     read_mesh: Callable[[Path], list[RawMesh]]
     strict: bool
-    lost: dict[tuple[str, str], None] = field(default_factory=dict)
+    lost: Losses = field(default_factory=Losses)
     named: dict[tuple[str, str], Entity] = field(default_factory=dict)  # by kind and name
     made: dict[Any, Any] = field(default_factory=dict)  # what was converted already
     making: list[Entity] = field(default_factory=list)  # what refers to what is converted now
@@ -244,19 +245,6 @@ class Job:
     def medium(self, name: str) -> Any:
         """Return a medium by its name; None where there is none."""
         return self.convert(self.refer("medium", name)) if name else None
-
-    def report(self) -> None:
-        """Warn of all that is not honored."""
-        if self.lost:
-            name = str(self.files.scene)
-            places: dict[str, list[str]] = {}
-            for place, what in self.lost:
-                places.setdefault(what, []).append(place.removeprefix(name).strip())
-            lines = (
-                f"{found[0]}: {what}{f' ({len(found) - 1} more)' if found[1:] else ''}"
-                for what, found in places.items()
-            )
-            warn(f"{name}: not honored: {'; '.join(lines)}", self.strict)
 
     def _converted(self, entity: Entity) -> Any:
         key = (entity.kind.removeprefix("float ").removeprefix("spectrum "), entity.type)

@@ -109,7 +109,7 @@ class Reader:
                 found += instances(entity, job, np.array(matrices))
         lamps = [light for entity in self.lights if (light := job.convert(entity)) is not None]
         view = None if camera is None else job.convert(camera)
-        job.report()
+        job.lost.report(str(job.files.scene), job.strict)
         return Scene(found, lamps, view, settings=settings, medium=job.around)
 
     def _entity(self, kind: str, statement: Statement, target: str, type: str, name: str = "") -> Entity:
@@ -193,12 +193,12 @@ class Reader:
     def _ColorSpace(self, statement: Statement) -> None:
         if statement.words[0] != "srgb":
             what = f"ColorSpace {statement.words[0]!r}; 'srgb' in its place"
-            self.job.lost[statement.place, what] = None
+            self.job.lost.note(what, statement.place)
 
     def _Option(self, statement: Statement) -> None:
         name, value = statement.words
         if name.lower() not in HARMLESS.split() and value != "false":
-            self.job.lost[statement.place, f"Option {name!r}"] = None
+            self.job.lost.note(f"Option {name!r}", statement.place)
 
     def _TransformTimes(self, statement: Statement) -> None:
         """Do nothing: what moves is noted."""
