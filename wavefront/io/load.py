@@ -37,7 +37,7 @@ def load(
     smooth: bool | float | str = AUTO,
     parameters: Mapping[str, Any] | None = None,
 ) -> Scene:
-    """Read a scene: obj (with its mtl), ply, stl, glb, gltf, off, dae, 3mf, xml of Mitsuba 3, or pbrt.
+    """Read a scene: obj (with its mtl), ply, stl, glb, gltf, off, dae, 3mf, xml of Mitsuba 3, pbrt, or usd.
 
     Points of .obj and .ply files without faces become `Spheres`, whose radius a warning states.
 

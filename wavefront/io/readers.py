@@ -169,6 +169,12 @@ def _read_mitsuba(files: SceneFiles, data: bytes, options: LoadOptions) -> Conte
     return Contents([], Places.once(0), scene.lights, scene.camera, scene.shapes, settings=scene.settings)
 
 
+def _read_usd(files: SceneFiles, data: bytes, options: LoadOptions) -> Contents:
+    from .usd.stage import read_usd  # here, as programs that read no such scene need not pay for it
+
+    return read_usd(files, options.strict)
+
+
 PARTS = ("lights", "camera", "shapes", "settings", "medium")  # of a scene, that contents have, too
 
 
@@ -230,6 +236,7 @@ READERS: Registry[Reader] = Registry(
         ".3mf": _read_3mf,
         ".xml": _read_mitsuba,
         ".pbrt": _read_pbrt,
+        **dict.fromkeys((".usd", ".usda", ".usdc", ".usdz"), _read_usd),
     },
     adapt=_from_scene,
 )

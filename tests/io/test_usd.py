@@ -1,0 +1,399 @@
+"""Scenes of USD, where usd-core is installed: each kind of prim, and what is not honored."""
+
+from __future__ import annotations
+
+import builtins
+import random
+import warnings
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+import wavefront as wf
+from wavefront.codecs.images import write_image
+
+TRIANGLE = """int[] faceVertexCounts = [4]
+    int[] faceVertexIndices = [0, 1, 2, 3]
+    point3f[] points = [(0, 0, 0), (2, 0, 0), (2, 1, 0), (0, 1, 0)]
+    uniform token subdivisionScheme = "none"
+"""
+MESH = f'def Mesh "board"\n{{\n    {TRIANGLE}}}\n'
+PAINT = """def Material "paint"
+{
+    token outputs:surface.connect = </paint/shader.outputs:surface>
+    def Shader "shader"
+    {
+        uniform token info:id = "UsdPreviewSurface"
+        %s
+        token outputs:surface
+    }
+    %s
+}
+"""
+BOUND = f"""def Mesh "board" (prepend apiSchemas = ["MaterialBindingAPI"])
+{{
+    {TRIANGLE}
+    texCoord2f[] primvars:st = [(0, 0), (1, 0), (1, 1), (0, 1)] (interpolation = "vertex")
+    rel material:binding = </paint>
+}}
+"""
+IMAGE = """def Shader "image"
+    {
+        uniform token info:id = "UsdUVTexture"
+        asset inputs:file = @a.png@
+        token inputs:wrapS = "mirror"
+        token inputs:wrapT = "clamp"
+        float4 inputs:scale = (0.5, 0.5, 0.5, 1)
+        float2 inputs:st.connect = </paint/move.outputs:result>
+        float3 outputs:rgb
+        float outputs:g
+    }
+    def Shader "move"
+    {
+        uniform token info:id = "UsdTransform2d"
+        float inputs:rotation = 90
+        float2 inputs:scale = (2, 3)
+        float2 inputs:translation = (0.25, 0.5)
+        float2 outputs:result
+    }"""
+
+
+@pytest.fixture(autouse=True)
+def _needs_usd(request: pytest.FixtureRequest) -> None:
+    if "missing" not in request.node.name:
+        pytest.importorskip("pxr")
+
+
+def load(
+    folder: Path, body: str, header: str = "metersPerUnit = 1", strict: bool = True, **options: Any
+) -> wf.Scene:
+    path = folder / "scene.usda"
+    path.write_text(f"#usda 1.0\n({header})\n{body}")
+    return wf.load(path, strict=strict, **options)
+
+
+def rows(value: Any) -> Any:
+    return np.asarray(value).ravel().tolist()
+
+
+def test_usd_core_that_is_missing_is_named(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    whole = builtins.__import__
+
+    def without(name: str, *rest: Any) -> Any:
+        if name == "pxr":
+            raise ImportError(name)
+        return whole(name, *rest)
+
+    monkeypatch.setattr(builtins, "__import__", without)
+    with pytest.raises(wf.SceneError, match=r"scene\.usda: files of USD need usd-core: pip install usd-core"):
+        load(tmp_path, MESH)
+
+
+def test_meshes_transforms_units_and_what_is_up(tmp_path: Path) -> None:
+    body = f"""def Xform "a"
+{{
+    double3 xformOp:translate = (1, 2, 3)
+    float xformOp:rotateZ = 90
+    uniform token[] xformOpOrder = ["xformOp:translate", "xformOp:rotateZ"]
+    {MESH}
+}}
+"""
+    scene = load(tmp_path, body, 'metersPerUnit = 0.1\nupAxis = "Z"')
+    (board,) = scene.shapes
+    np.testing.assert_allclose(board.vertices.min(0), [0, 0.2, 0.3], atol=1e-6)
+    np.testing.assert_allclose(board.vertices.max(0), [0.1, 0.4, 0.3], atol=1e-6)
+    assert len(board.faces) == 2
+    assert rows(scene.up) == [0, 0, 1]
+    assert board.name == "board"
+
+
+def test_orientation_turns_faces(tmp_path: Path) -> None:
+    for text, z in (("", 1), ('uniform token orientation = "leftHanded"', -1)):
+        (mesh,) = load(tmp_path, MESH.replace("{\n", "{\n" + text + "\n", 1)).shapes
+        a, b, c = mesh.vertices[mesh.faces[0]]
+        assert np.sign(np.cross(b - a, c - a)[2]) == z
+
+
+def test_primvars_of_every_interpolation(tmp_path: Path) -> None:
+    for kind, count in (("constant", 1), ("uniform", 1), ("vertex", 4), ("faceVarying", 4)):
+        colors = [(0.1 * i, 0.5, 1) for i in range(count)]
+        text = f'color3f[] primvars:displayColor = {colors} (interpolation = "{kind}")\n'
+        (mesh,) = load(tmp_path, MESH.replace("{\n", "{\n" + text, 1)).shapes
+        for corner, color in zip(mesh.vertices, mesh.colors, strict=True):
+            number = [[0, 0], [2, 0], [2, 1], [0, 1]].index(corner[:2].tolist()) if count > 1 else 0
+            np.testing.assert_allclose(color[:3], colors[number], atol=1e-6)
+        assert isinstance(mesh.material.bsdf.reflectance, wf.VertexColors)
+
+
+def test_subsets_have_materials_of_their_own(tmp_path: Path) -> None:
+    body = MESH.replace("[4]", "[3, 3]").replace("[0, 1, 2, 3]", "[0, 1, 2, 0, 2, 3]")
+    body = body.replace(
+        "}\n",
+        """
+    def GeomSubset "second" (prepend apiSchemas = ["MaterialBindingAPI"])
+    {
+        uniform token elementType = "face"
+        uniform token familyName = "materialBind"
+        int[] indices = [1]
+        rel material:binding = </paint>
+    }
+}
+""",
+    )
+    paint = PAINT % ("color3f inputs:diffuseColor = (0.2, 0.4, 0.6)", "")
+    second, first = load(tmp_path, paint + body).shapes
+    assert [len(second.faces), len(first.faces)] == [1, 1]
+    np.testing.assert_allclose(rows(second.material.bsdf.base_color), [0.2, 0.4, 0.6], atol=1e-6)
+    assert first.material.name is None
+
+
+def test_preview_surfaces(tmp_path: Path) -> None:
+    text = """color3f inputs:emissiveColor = (1, 2, 3)
+        float inputs:metallic = 0.25
+        float inputs:roughness = 0.75
+        float inputs:ior = 1.4
+        float inputs:clearcoat = 0.5
+        float inputs:clearcoatRoughness = 0.125
+        float inputs:opacity = 0.5"""
+    (mesh,) = load(tmp_path, PAINT % (text, "") + BOUND).shapes
+    bsdf = mesh.material.bsdf
+    for name, value in (
+        ("base_color", 0.18),
+        ("metallic", 0.25),
+        ("roughness", 0.75),
+        ("ior", 1.4),
+        ("clearcoat", 0.5),
+        ("clearcoat_roughness", 0.125),
+    ):
+        np.testing.assert_allclose(getattr(bsdf, name), value, rtol=1e-6)
+    assert rows(mesh.emission) == [1, 2, 3]
+    assert float(np.ravel(mesh.material.alpha)[0]) == 0.5
+    assert rows(mesh.uvs[mesh.faces[0]]) == [0, 0, 1, 0, 1, 1]
+
+
+def test_textures(tmp_path: Path) -> None:
+    write_image(tmp_path / "a.png", np.full((4, 4, 3), 0.5, np.float32))
+    text = """color3f inputs:diffuseColor.connect = </paint/image.outputs:rgb>
+        float inputs:roughness.connect = </paint/image.outputs:g>"""
+    (mesh,) = load(tmp_path, PAINT % (text, IMAGE) + BOUND).shapes
+    base, rough = mesh.material.bsdf.base_color, mesh.material.bsdf.roughness
+    assert (base.srgb, rough.srgb, rough.scalar) == (True, False, True)
+    assert base.wrap == ("mirror", "clamp")
+    np.testing.assert_allclose(base.transform, [[0, -3, 0.25], [2, 0, 0.5], [0, 0, 1]], atol=1e-6)
+    np.testing.assert_allclose(np.ravel(base.scale), 0.5)
+    (tmp_path / "a.png").unlink()
+    with pytest.warns(UserWarning, match=r"/paint/image the image 'a\.png', which is missing"):
+        load(tmp_path, PAINT % (text, IMAGE) + BOUND, strict=False)
+
+
+def test_instances_share_their_mesh(tmp_path: Path) -> None:
+    copies = "".join(
+        f"""def Xform "copy{i}" (instanceable = true
+    prepend references = </model>)
+{{
+    double3 xformOp:translate = ({i}, 0, 0)
+    uniform token[] xformOpOrder = ["xformOp:translate"]
+}}
+"""
+        for i in (1, 2)
+    )
+    scene = load(tmp_path, f'def Xform "model"\n{{\n{MESH}}}\n{copies}')
+    shapes = scene.shapes
+    assert len(shapes) == 3
+    assert shapes[-1].mesh is shapes[-2].mesh
+    assert [shape.transform[0, 3] for shape in shapes[-2:]] == [1, 2]
+
+
+def test_point_instancers(tmp_path: Path) -> None:
+    body = f"""def PointInstancer "many"
+{{
+    int[] protoIndices = [0, 0, 0]
+    point3f[] positions = [(0, 0, 0), (5, 0, 0), (0, 7, 0)]
+    float3[] scales = [(1, 1, 1), (2, 2, 2), (1, 1, 1)]
+    rel prototypes = [</many/board>]
+    {MESH}
+}}
+"""
+    shapes = load(tmp_path, body).shapes
+    assert [rows(shape.transform[:3, 3]) for shape in shapes] == [[0, 0, 0], [5, 0, 0], [0, 7, 0]]
+    assert [shape.transform[0, 0] for shape in shapes] == [1, 2, 1]
+    with pytest.raises(wf.SceneError, match=r"scene\.usda: .*/many: protoIndices has 3; there are 1"):
+        load(tmp_path, body.replace("[0, 0, 0]", "[0, 3, 0]", 1))
+    with pytest.raises(wf.SceneError, match=r"LoadLimits\.instances"):
+        load(tmp_path, body, limits=wf.LoadLimits(instances=1))
+
+
+@pytest.mark.parametrize("normalize", [0, 1])
+def test_lights_with_areas(tmp_path: Path, normalize: int) -> None:
+    common = f"float inputs:intensity = 3 float inputs:exposure = 1 bool inputs:normalize = {normalize}"
+    common = "\n".join(
+        f"    {part}" for part in common.replace(" float", "\nfloat").replace(" bool", "\nbool").split("\n")
+    )
+    body = MESH
+    for name, own in (("Sphere", "radius = 2"), ("Disk", "radius = 2"), ("Rect", "width = 4")):
+        body += f'def {name}Light "l{name}"\n{{\n{common}\n    float inputs:{own}\n}}\n'
+    _, ball, disk, board = load(tmp_path, body).shapes
+    areas = [16 * np.pi, 4 * np.pi, 4] if normalize else [1, 1, 1]
+    for shape, area in zip((ball, disk, board), areas, strict=True):
+        np.testing.assert_allclose(np.ravel(shape.emission), 6 / area, rtol=1e-5)
+    assert ball.radius == 2
+    for mesh, extent in ((disk, 2), (board, 2)):
+        a, b, c = mesh.vertices[mesh.faces[0]]
+        assert np.cross(b - a, c - a)[2] < 0
+        assert np.abs(mesh.vertices[:, 0]).max() == pytest.approx(extent, rel=0.01)
+
+
+def test_panels_may_be_stretched_and_balls_not(tmp_path: Path) -> None:
+    body = """def RectLight "panel"
+{
+    float3 xformOp:scale = (2, 3, 1)
+    uniform token[] xformOpOrder = ["xformOp:scale"]
+}
+"""
+    _, panel = load(tmp_path, MESH + body).shapes
+    np.testing.assert_allclose(panel.vertices.max(0), [1, 1.5, 0])
+    with pytest.raises(wf.SceneError, match="/panel its stretch"):
+        load(tmp_path, MESH + body.replace("Rect", "Sphere"))
+
+
+def test_lights_at_infinity(tmp_path: Path) -> None:
+    write_image(tmp_path / "sky.exr", np.linspace(0, 1, 96, dtype=np.float32).reshape(4, 8, 3))
+    body = (
+        MESH
+        + """def DistantLight "sun"
+{
+    float inputs:intensity = 5
+    float inputs:angle = 1
+    bool inputs:normalize = 1
+}
+def DomeLight "sky"
+{
+    color3f inputs:color = (1, 0.5, 0.25)
+    asset inputs:texture:file = @sky.exr@
+}
+"""
+    )
+    sun, sky = load(tmp_path, body).lights
+    np.testing.assert_allclose(sun.direction, [0, 0, -1], atol=1e-6)
+    np.testing.assert_allclose(np.ravel(sun.irradiance), 5)
+    assert sun.angle == 1
+    assert isinstance(sky, wf.Environment)
+    (plain,) = load(tmp_path, body.replace("bool inputs:normalize = 1", "")).lights[:1]
+    np.testing.assert_allclose(np.ravel(plain.irradiance), 5 * np.pi * np.sin(np.radians(0.5)) ** 2)
+
+
+def test_cameras(tmp_path: Path) -> None:
+    body = (
+        MESH
+        + """def Camera "view"
+{
+    float horizontalAperture = 36
+    float verticalAperture = 24
+    float focalLength = 50
+    float fStop = 2
+    float focusDistance = 8
+    double3 xformOp:translate = (0, 0, 9)
+    uniform token[] xformOpOrder = ["xformOp:translate"]
+}
+"""
+    )
+    camera = load(tmp_path, body).camera
+    assert camera.size == (768, 512)
+    assert camera.fov == pytest.approx(np.degrees(2 * np.arctan(12 / 50)))
+    lens = camera.projection
+    assert (lens.aperture, lens.focus) == pytest.approx((2.5, 8))
+    np.testing.assert_allclose(camera.to_matrix()[:3, 3], [0, 0, 9])
+
+
+def test_the_first_time_counts(tmp_path: Path) -> None:
+    body = MESH.replace(
+        "{\n",
+        """{
+    double3 xformOp:translate.timeSamples = { 5: (1, 0, 0), 9: (2, 0, 0) }
+    uniform token[] xformOpOrder = ["xformOp:translate"]
+""",
+        1,
+    )
+    (mesh,) = load(tmp_path, body, "metersPerUnit = 1\nstartTimeCode = 5\nendTimeCode = 9").shapes
+    assert mesh.vertices[:, 0].min() == 1
+
+
+def test_what_is_hidden_is_left_out(tmp_path: Path) -> None:
+    hidden = MESH.replace("board", "hidden").replace("{\n", '{\n    token visibility = "invisible"\n', 1)
+    guide = MESH.replace("board", "guide").replace("{\n", '{\n    uniform token purpose = "guide"\n', 1)
+    assert [shape.name for shape in load(tmp_path, MESH + hidden + guide).shapes] == ["board"]
+
+
+@pytest.mark.parametrize(
+    ("body", "message"),
+    [
+        (f'def Cone "hat"\n{{\n}}\n{MESH}', "/hat a Cone; left out"),
+        (PAINT % ("float inputs:displacement = 1", "") + BOUND, "/paint/shader displacement"),
+        (MESH + 'def SphereLight "l"\n{\n    bool treatAsPoint = 1\n}\n', "/l treatAsPoint"),
+        (PAINT.replace("UsdPreviewSurface", "Other") % ("", "") + BOUND, "/paint its surface shader"),
+        (MESH.replace('"none"', '"catmullClark"'), "/board subdivisionScheme"),
+    ],
+)
+def test_what_is_not_honored_is_one_warning(tmp_path: Path, body: str, message: str) -> None:
+    with pytest.raises(wf.SceneError, match=f"not honored: {message}"):
+        load(tmp_path, body)
+    with pytest.warns(UserWarning, match=message):
+        load(tmp_path, body, strict=False)
+
+
+def test_files_elsewhere_and_malformed_ones_are_refused(tmp_path: Path) -> None:
+    inner = tmp_path / "inner"
+    inner.mkdir()
+    (tmp_path / "other.usda").write_text(f'#usda 1.0\ndef "model"\n{{\n{MESH}}}\n')
+    body = 'def Xform "a" (prepend references = @../other.usda@</model>)\n{\n}\n'
+    with pytest.raises(wf.SceneError, match="outside its folder"):
+        load(inner, body)
+    assert load(inner, body, search_paths=tmp_path).shapes
+    with pytest.raises(wf.SceneError, match=r"scene\.usda: cannot be read: .*scene\.usda"):
+        load(tmp_path, 'def Mesh "a\n')
+    for wrong in ("[0, 1, 2, 9]", "[0, 1, 2]"):
+        with pytest.raises(wf.SceneError, match="/board: faceVertex"):
+            load(tmp_path, MESH.replace("[0, 1, 2, 3]", wrong))
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_mutated_files_give_a_scene_or_a_typed_error(tmp_path: Path, seed: int) -> None:
+    """Words exchanged, left out and repeated, and numbers that are odd."""
+    chance = random.Random(seed)
+    light = (
+        'def SphereLight "l"\n{\n    float inputs:radius = 2\n}\ndef Camera "c"\n{\n    float fStop = 2\n}\n'
+    )
+    words = (PAINT % ("float inputs:roughness = 0.5", "") + BOUND + light).replace("(", " ( ").split(" ")
+    refused = 0
+    for _ in range(40):
+        text = list(words)
+        for _ in range(chance.randint(0, 2)):
+            at = chance.randrange(len(text))
+            text[at] = chance.choice([text[chance.randrange(len(text))], "", "-1", "1e300", "nan", "[]"])
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")
+            try:
+                load(tmp_path, " ".join(text), strict=False)
+            except wf.SceneError:
+                refused += 1
+    assert 0 < refused < 40
+
+
+def test_binary_files_and_archives_with_images(tmp_path: Path) -> None:
+    from pxr import Usd, UsdUtils
+
+    write_image(tmp_path / "a.png", np.full((4, 4, 3), 0.5, np.float32))
+    text = "color3f inputs:diffuseColor.connect = </paint/image.outputs:rgb>"
+    load(tmp_path, PAINT % (text, IMAGE) + BOUND)
+    source = str(tmp_path / "scene.usda")
+    Usd.Stage.Open(source).Export(str(tmp_path / "scene.usdc"))
+    assert UsdUtils.CreateNewUsdzPackage(source, str(tmp_path / "packed.usdz"))
+    (mesh,) = wf.load(tmp_path / "scene.usdc", strict=True).shapes
+    assert mesh.material.bsdf.base_color.size == (4, 4)
+    (tmp_path / "alone").mkdir()
+    (tmp_path / "packed.usdz").rename(tmp_path / "alone" / "packed.usdz")
+    (mesh,) = wf.load(tmp_path / "alone" / "packed.usdz", strict=True).shapes
+    assert mesh.material.bsdf.base_color.size == (4, 4)
+    assert mesh.material.bsdf.base_color.wrap == ("mirror", "clamp")
