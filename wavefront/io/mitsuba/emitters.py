@@ -110,11 +110,10 @@ def _sun_and_sky(node: Node, job: Job) -> list[Light]:
 
     found: list[Light] = [sky(factors["sky"], disk=False)] if factors["sky"] else []
     if factors["sun"]:
-        power, aperture = sky(factors["sun"], disk=True).direct_normal, node.number("sun_aperture", 0.5358)
-        slant = (
-            1 + float(sin_cos(np.float64(np.radians(aperture) / 2))[1])
-        ) / 2  # the mean cosine on the disk
-        found.append(DirectionalLight(-sun, power * slant, angle=aperture))
+        aperture = node.number("sun_aperture", 0.5358)
+        rim = float(sin_cos(np.float64(np.radians(aperture) / 2))[1])
+        power = sky(factors["sun"], disk=True).direct_normal * (1 + rim) / 2  # the mean cosine on the disk
+        found.append(DirectionalLight(-sun, power, angle=aperture))
     return found
 
 
