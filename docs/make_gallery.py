@@ -41,6 +41,7 @@ PICTURES = {  # size, samples per pixel, whether it is denoised, whether it has 
     "own_material": (1200, 64, True, True),
     "material_sheet": (1200, 40, True, False),
     "skies": (280, 24, True, False),
+    "office": (480, 32, True, False),
     "layers": (297, 64, False, False),
     "estimators": (300, 32, False, False),
     "default_look": (1200, 32, True, False),

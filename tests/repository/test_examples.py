@@ -34,6 +34,7 @@ SHAPES = {  # the picture of --size 24, (height, width)
     "material_sheet": (16, 24),
     "milk": (24, 24),
     "molecule": (16, 24),
+    "office": (440, 1200),
     "own_material": (15, 24),
     "photograph": (16, 24),
     "scan": (16, 24),
