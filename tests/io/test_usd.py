@@ -169,6 +169,9 @@ def test_preview_surfaces(tmp_path: Path) -> None:
     ):
         np.testing.assert_allclose(getattr(bsdf, name), value, rtol=1e-6)
     assert rows(mesh.emission) == [1, 2, 3]
+    (plain,) = load(tmp_path, PAINT % ("", "") + BOUND).shapes
+    for name, value in (("roughness", 0.5), ("metallic", 0), ("ior", 1.5), ("clearcoat_roughness", 0.01)):
+        np.testing.assert_allclose(getattr(plain.material.bsdf, name), value, rtol=1e-6)
     assert float(np.ravel(mesh.material.alpha)[0]) == 0.5
     assert rows(mesh.uvs[mesh.faces[0]]) == [0, 0, 1, 0, 1, 1]
 
@@ -183,6 +186,17 @@ def test_textures(tmp_path: Path) -> None:
     assert base.wrap == ("mirror", "clamp")
     np.testing.assert_allclose(base.transform, [[0, -3, 0.25], [2, 0, 0.5], [0, 0, 1]], atol=1e-6)
     np.testing.assert_allclose(np.ravel(base.scale), 0.5)
+    for given, message in (
+        ("asset inputs:file = @a.png@", "string inputs:file = 3"),
+        ('"UsdUVTexture"', "3"),
+    ):
+        with pytest.raises(wf.SceneError, match=r"scene\.usda"):
+            load(tmp_path, (PAINT % (text, IMAGE)).replace(given, message) + BOUND)
+    with pytest.raises(wf.SceneError, match=r"/paint/image: file is .*; it must be an asset path"):
+        load(
+            tmp_path,
+            (PAINT % (text, IMAGE)).replace("asset inputs:file = @a.png@", "odd inputs:file = 3") + BOUND,
+        )
     (tmp_path / "a.png").unlink()
     with pytest.warns(UserWarning, match=r"/paint/image the image 'a\.png', which is missing"):
         load(tmp_path, PAINT % (text, IMAGE) + BOUND, strict=False)

@@ -89,7 +89,7 @@ class Materials:
         return tuple(float(part) for part in value) if color else float(value)
 
     def _texture(self, source: Any, output: str, default: Any, color: bool, normal: bool) -> Any:
-        kind = source.GetIdAttr().Get() or ""
+        kind = str(source.GetIdAttr().Get() or "")
         if kind.startswith("UsdPrimvarReader_float3") and color:
             return VertexColors()
         path = self._get(source, "file")
@@ -140,6 +140,8 @@ class Materials:
 
     def pixels(self, prim: Any, file: Any) -> Any:
         """Return the values of an image, which may be in a usdz archive, or None if it is missing."""
+        if not hasattr(file, "resolvedPath"):  # a value of another type than the schema has
+            raise SceneError(f"{prim.GetPath()}: file is {str(file)[:60]!r}; it must be an asset path")
         name = file.resolvedPath or file.path
         if name not in self._images:
             self._images[name] = self._read(name)
