@@ -373,9 +373,16 @@ def test_scenes_without_scattering_need_no_table() -> None:
         assert compile_scene(scene, lambda g: make_accelerator(g, "numpy")).media is None
 
 
-def test_absorption_alone_is_as_before() -> None:
+@pytest.mark.parametrize(
+    "tinted",
+    [
+        wf.Medium((0.2, 1, 3)),
+        wf.Medium((0.1, 0.5, 1.5), scale=2),
+        wf.Medium(albedo=0, mean_free_path=(5, 1, 1 / 3)),
+    ],
+)
+def test_absorption_alone_is_as_before(tinted: wf.Medium) -> None:
     """With and without the table the light through a ball of glass is the same."""
-    tinted = wf.Medium((0.2, 1, 3))
     camera = wf.Camera.look_at((0, 0, 5), (0, 0, 0), fov=30, size=(16, 16))
     one, two = (
         render(
@@ -392,12 +399,13 @@ def test_what_media_exclude_is_refused(setting: str) -> None:
         render(room(FOG), 1, **{setting: True})
 
 
-def test_media_scale_with_the_scene() -> None:
+@pytest.mark.parametrize("scattering", [0, 1])
+def test_media_scale_with_the_scene(scattering: int) -> None:
     """In scenes of extreme size, which are rendered in another unit."""
     small, large = (
         render(
             wf.Scene(
-                ball(wf.Medium(0.5 / size, 1 / size), size),
+                ball(wf.Medium(0.5 / size, scattering / size), size),
                 wf.Environment(1),
                 wf.Camera.look_at((0, 0, 5 * size), (0, 0, 0), fov=25, size=(8, 8)),
             ),

@@ -14,6 +14,7 @@ from ..bsdfs import Bsdf
 from ..core.errors import SceneError, warn_caller
 from ..core.plural import plural
 from ..materials import Material, Opacity
+from ..media import Medium
 from ..shapes import CurvedShape, Instance, Mesh, Shape
 from ..shapes.attributes import ATTRIBUTES
 from ..textures.base import BaseTexture
@@ -86,8 +87,8 @@ def absorption_table(materials: Sequence[Material]) -> Floats | None:
     """Return the absorption behind the surfaces of each material, (3, materials), if there is any."""
     table = np.zeros((3, len(materials)), f4)
     for i, material in enumerate(materials):
-        if material.interior is not None:
-            table[:, i] = np.ravel(material.interior.absorption)
+        if isinstance(material.interior, Medium):
+            table[:, i] = np.ravel(material.interior.sigma_a)
     return table if table.any() else None
 
 

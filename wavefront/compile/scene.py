@@ -180,14 +180,13 @@ def compile_scene(
         specular = find_specular_surfaces(
             triangles[:once], table_of_curved, material_of.take(whole), light_of.take(whole), groups_of
         )
-    absorption = absorption_table(user_materials)
+    absorption = absorption_table(user_materials) if media is None else None
     if media is not None:
         # events in media have the numbers from -2 down, so their entries are those before that of a miss
         rows = np.arange(len(user_materials) - len(phases), len(user_materials))
         material_of = np.concatenate([material_of, rows[::-1], [0]])
         light_of = np.append(light_of, np.full(len(phases), -1))
         has_alpha = np.append(has_alpha, np.zeros(len(phases), np.bool_))
-        absorption = None
         groups = groups.with_media() if media.glows else groups
     light_of = np.append(light_of, environment)
     return CompiledScene(
