@@ -146,7 +146,7 @@ def test_tables_have_their_shape_by_the_roughness(across: float | None) -> None:
         """A surface of microfacets without a model."""
 
         def __init__(self, roughness):
-            self._set_facets(roughness, across, 0.0, "beckmann", "separable")
+            self._set_facets(roughness, across, 0.0, "beckmann", "separable", True)
             self.derive()
 
         def evaluate(self, wo, wi):

@@ -166,8 +166,15 @@ PAIRS = [
     (wf.Conductor.named("gold", roughness=0.3), wf.Conductor.named("silver", roughness=0.3)),
     (wf.OrenNayar(0.8, 0.3), wf.OrenNayar((0.2, 0.3, 0.4), 0.6)),
     (wf.ThinDielectric(1.5), wf.ThinDielectric(1.3)),
-    (wf.Principled((0.8, 0.1, 0.1), 0.3, 0.2), wf.Principled(0.4, 1.0, 0.6, 1.3)),
-    (wf.Principled((0.8, 0.1, 0.1), transmission=0.5), wf.Principled(0.4, transmission=1.0, ior=1.3)),
+    (wf.Principled((0.8, 0.1, 0.1), 0, 0.2), wf.Principled(0.4, 0, 0.6, 1.3)),
+    (
+        wf.Principled((0.8, 0.1, 0.1), 0.3, 0.2, multiscatter=False),
+        wf.Principled(0.4, 1.0, 0.6, 1.3, multiscatter=False),
+    ),
+    (
+        wf.Principled((0.8, 0.1, 0.1), transmission=0.5, multiscatter=False),
+        wf.Principled(0.4, transmission=1.0, ior=1.3, multiscatter=False),
+    ),
     (wf.Principled(0.8, clearcoat=0.5, sheen=0.2), wf.Principled((0.1, 0.4, 0.6), clearcoat=1.0, sheen=1.0)),
 ]
 

@@ -8,7 +8,7 @@ from typing import Self
 import numpy as np
 
 from ..arrays.state import SurfaceInteraction
-from ..arrays.vec import BELOW_ONE, Floats, broadcast, dot, f4
+from ..arrays.vec import BELOW_ONE, Bools, Floats, broadcast, dot, f4
 from ..core.errors import one_of
 from ..core.parameter import Parameter
 from ..core.suggestions import suggests_keywords
@@ -94,6 +94,8 @@ class Dielectric(RefractiveBsdf):
     film_thickness = Parameter(thickness)
     film_ior = Parameter(refractive_index)
 
+    inside: Bools = np.zeros(1, np.bool_)  # (n,) wo is inside
+
     @suggests_keywords
     def __init__(
         self,
@@ -152,7 +154,7 @@ class Dielectric(RefractiveBsdf):
         self.before = np.ones(1, f4)  # (n,) or (3, n) index on the side of wo
         self.specular = self.specular or bool(straight)
         self.again = self.multiscatter and constant and not (self._split or self.specular)
-        self.inside = np.zeros(1, np.bool_)  # (n,) wo is inside
+        self.boundary = float(self.ior[0]) if self.again else None  # the index that its tables are for
         self.eta = self.ior  # (n,), (1,) or (3, n) index beyond / before; unbound, wo is outside
 
     def bind(self, surface: SurfaceInteraction) -> Self:
@@ -207,7 +209,8 @@ class Dielectric(RefractiveBsdf):
         return f + tint * added, pdf * (f4(1) - chance) + spread * chance
 
     def _loss(self) -> Loss:
-        return loss(self.shape, float(self.ior[0]))
+        assert self.boundary is not None
+        return loss(self.shape, self.boundary)
 
     def sample_f(self, wo: Floats, u: Floats) -> BsdfSample:
         """Reflect with the probability of the Fresnel reflectance (by u[2]), else refract.

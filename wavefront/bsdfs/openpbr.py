@@ -24,7 +24,7 @@ from .energy import Shape, mean_over_cosines
 from .fresnel import fresnel_dielectric
 from .microfacet import Facets, alpha_of
 from .oren_nayar import OrenNayar
-from .principled import Principled
+from .principled import Principled, bent
 from .rough import Tangent
 from .sheen import sheen_albedo
 
@@ -141,6 +141,8 @@ class OpenPBRBsdf(JointBsdf):
         layers._sheet_again = again and self.transmissive and self.thin
         known = not (self.thin or layers.has_film or textures & {"specular_ior", "specular_weight"})
         layers._clear_again = again and self.transmissive and known
+        if layers._clear_again:
+            layers._boundary = float(bent(weighted_index(self.specular_ior, self.specular_weight))[0])
         self._layers = layers if textures else self._filled(layers)
 
     def bind(self, surface: SurfaceInteraction) -> Self:

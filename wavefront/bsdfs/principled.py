@@ -18,7 +18,7 @@ from ..textures.parameter import Color, Scalar, color, refractive_index, scalar
 from .albedo import gloss_tables, lookup
 from .base import BsdfSample, weigh
 from .dielectric import LEAST_BEND
-from .energy import Loss, gain, loss, mean_over_cosines, part_kept
+from .energy import Loss, Shape, gain, loss, mean_over_cosines, part_kept
 from .fresnel import fresnel_dielectric
 from .microfacet import Facets, alpha_of, reflect, refract
 from .rough import RoughBsdf
@@ -166,6 +166,10 @@ class Principled(RoughBsdf):
         self._sheet_again = again and self.transmissive and self.thin
         known = not (self.thin or self.has_film or isinstance(self.ior, BaseTexture))
         self._clear_again = again and self.transmissive and known
+        # tables are of one index; materials that need none are shaded together
+        self._boundary = float(bent(self.ior)[0]) if self._clear_again else None
+        if not (self._metal_again or self._sheet_again or self._clear_again):
+            self.shape = Shape(None, None, False, False)
 
     def bind(self, surface: SurfaceInteraction) -> Self:
         """Return the BSDF bound to `surface`, with the side of `wo`."""
@@ -300,7 +304,8 @@ class Principled(RoughBsdf):
         return np.zeros(1, np.bool_) if self.back_facing is None else self.back_facing
 
     def _loss(self) -> Loss:
-        return loss(self.shape, float(_bent(self.ior)[0]))
+        assert self._boundary is not None
+        return loss(self.shape, self._boundary)
 
     def _through(self, wo: Floats, wi: Floats, facets: Facets) -> tuple[Floats, Floats]:
         """Transmission with its Fresnel factor: value (n,), with a film (3, n), and density (n,)."""
@@ -345,8 +350,8 @@ class Principled(RoughBsdf):
         """Index beyond / before, (n,) or (1,); 1 for a sheet, and never quite 1 otherwise."""
         if self.thin:
             return np.ones(1, f4)
-        bent = _bent(self.ior)
-        return bent if self.back_facing is None else np.where(self.back_facing, f4(1) / bent, bent)
+        index = bent(self.ior)
+        return index if self.back_facing is None else np.where(self.back_facing, f4(1) / index, index)
 
     def _under_gloss(self, wo: Floats, wi: Floats) -> Floats:
         """Part of the light that reaches the diffuse base and leaves it again, (n,).
@@ -421,7 +426,7 @@ def _used(parameter: Any) -> bool:
     return isinstance(parameter, BaseTexture) or bool((parameter > 0).any())
 
 
-def _bent(ior: Floats) -> Floats:
+def bent(ior: Floats) -> Floats:
     """Return an index that is at least `LEAST_BEND` away from 1."""
     return np.where(np.abs(ior - f4(1)) < LEAST_BEND, f4(1 + LEAST_BEND), ior)
 

@@ -88,8 +88,9 @@ class RoughBsdf(JointBsdf):
     def _set_shape(self) -> None:
         """Set the tangent, and what tables of lost light depend on."""
         self.tangent = None if self.roughness_v is None else Tangent(self.rotation)
-        textures = isinstance(self.roughness, BaseTexture) or isinstance(self.roughness_v, BaseTexture)
-        known = [] if textures else [r for r in (self.roughness, self.roughness_v) if r is not None]
+        both = [r for r in (self.roughness, self.roughness_v) if r is not None]
+        textures = any(isinstance(r, BaseTexture) for r in both)
+        known = both if self.multiscatter and not textures else []
         alpha, alpha_v, *_ = (*(float(alpha_of(r)[0]) for r in known), None, None)
         self.shape = Shape(alpha, alpha_v, self.distribution == "beckmann", self.shadowing == "separable")
 

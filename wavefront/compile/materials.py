@@ -146,7 +146,7 @@ def _group_key(bsdf: Bsdf) -> object:
     """Return equal keys for BSDFs that may be merged; one with a texture is merged with itself alone."""
     parameters = vars(bsdf)
     if not all(
-        _is_constant(v) or isinstance(v, bool | int | float | str | None) for v in parameters.values()
+        _is_constant(v) or isinstance(v, bool | int | float | str | tuple | None) for v in parameters.values()
     ):
         return id(bsdf)
     shapes = tuple((k, v.shape if _is_constant(v) else v) for k, v in sorted(parameters.items()))
