@@ -20,7 +20,7 @@ from typing import Any
 import numpy as np
 import scenes
 from scipy import stats
-from skies import dome, standard
+from sky_values import dome, standard
 
 import wavefront as wf
 

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from scenes import ALBEDO, EYE, HERE, floor, probe
 from significance import assert_mean, measure
-from skies import dome, standard
+from sky_values import dome, standard
 
 import wavefront as wf
 from wavefront import testing

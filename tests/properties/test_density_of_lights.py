@@ -154,6 +154,10 @@ def test_density_of_directions(kind: str, data: st.DataObject, place, u: tuple[f
         assume(sample.pdf[0] > 0)
         assume(sample.pdf[0] < 1e4)
         assume(sample.cos_light[0] > 0.02)  # grazing: area_pdf subtracts a guard, rounding is amplified
+        # at an edge of a table's cells the density jumps, by less than a kink that differences see
+        steps = 2e-4 * np.minimum(columns(*u), 1 - columns(*u)) * np.array([[1, -1, 0, 0], [0, 0, 1, -1]])
+        beside = light.sample_li(np.repeat(point, 4, 1), columns(*u) + steps).pdf / sample.pdf[0]
+        assume((np.abs(beside.reshape(2, 2).mean(1) - 1) < rounding / 2).all())
         assert_density(direction, u, sample.pdf[0], rounding)
         # the density at a direction is the one that the sample has, but for edges, which rounding moves
         assume(0.01 < min(u) < max(u) < 0.99)

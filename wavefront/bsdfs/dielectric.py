@@ -94,7 +94,7 @@ class Dielectric(RefractiveBsdf):
     film_thickness = Parameter(thickness)
     film_ior = Parameter(refractive_index)
 
-    inside: Bools = np.zeros(1, np.bool_)  # (n,) wo is inside
+    _inside: Bools = np.zeros(1, np.bool_)  # (n,) wo is inside
 
     @suggests_keywords
     def __init__(
@@ -163,7 +163,7 @@ class Dielectric(RefractiveBsdf):
         if surface.index_around is not None:
             vars(bound)["ior"] = bound.ior / surface.index_around  # not by assignment, which would check it
             bound.again = False  # its tables are those of one index
-        bound.inside = surface.back_facing
+        bound._inside = surface.back_facing
         bound.eta = np.where(surface.back_facing, f4(1) / bound.ior, bound.ior)
         if self.has_film:
             bound.before = np.where(surface.back_facing, bound.ior, f4(1))
@@ -204,7 +204,7 @@ class Dielectric(RefractiveBsdf):
         pdf = density * reflected + through_density * transmitted
         if not self.again:
             return f, pdf
-        added, spread, chance = self._loss().lobe(self, wo, wi, self.inside, chance)
+        added, spread, chance = self._loss().lobe(self, wo, wi, self._inside, chance)
         tint = np.where(wi[2] < 0, self.transmittance, self.reflectance)
         return f + tint * added, pdf * (f4(1) - chance) + spread * chance
 
@@ -242,7 +242,7 @@ class Dielectric(RefractiveBsdf):
         reflected, cos_refracted = fresnel_dielectric(cos, self.eta)
         choice, chance = u[2], None
         if self.again:
-            chance = self._loss().at(self, wo, self.inside)
+            chance = self._loss().at(self, wo, self._inside)
             again = choice < chance
             choice = np.where(again, choice, choice - chance) / np.where(again, chance, f4(1) - chance)
             choice = np.minimum(choice, BELOW_ONE)
@@ -250,7 +250,7 @@ class Dielectric(RefractiveBsdf):
         wi = np.where(reflects, reflect(wo, m), refract(wo, m, cos, cos_refracted, self.eta))
         if self.again:
             lanes = np.flatnonzero(again)
-            spread = self._loss().directions(self, np.stack([u[0], u[1], choice]), self.inside, lanes)
+            spread = self._loss().directions(self, np.stack([u[0], u[1], choice]), self._inside, lanes)
             wi[:, lanes], reflects[lanes] = spread, spread[2] > 0
         f, pdf = self._evaluate_rough(wo, wi, chance)
         # A facet may send light to the wrong side of the surface: no sample.

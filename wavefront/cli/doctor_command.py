@@ -73,6 +73,8 @@ EXTRAS = {
     "plot": Extra(("matplotlib",), "Image.plot"),
     "video": Extra(("av",), "animations as mp4"),
     "sky": Extra(("pvlib",), "sun_position and load_weather: where the sun stands"),
+    "materialx": Extra(("materialx",), "load_materialx: materials of MaterialX documents"),
+    "usd": Extra(("usd-core",), "scenes of USD"),
     "viewer": Extra(("viser",), "wf.view and wavefront view: a scene in the browser"),
     "completion": Extra(("shtab",), "completion of this command line in bash and zsh"),
 }

@@ -30,7 +30,7 @@ def add_measure_command(commands: Any) -> None:
         [
             "wavefront measure room.glb --grid 0,0.8,0:0,0,3:4,0,0:8x6 --noise 0.01 -o desk.csv",
             "wavefront measure room.glb --points sensors.csv --normal 0,1,0 --aov direct --aov indirect",
-            "wavefront measure meter.xml -o meter.csv  # what a sensor of the scene file measures",
+            "wavefront measure meter.xml -o meter.csv",
         ],
     )
     command.add_argument("scenes", nargs=1, metavar="scene", help=SCENE_FILE)

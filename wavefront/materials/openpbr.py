@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike
 
+from ..arrays.elementary import log
 from ..arrays.state import SurfaceInteraction
 from ..arrays.vec import Floats, f4
 from ..bsdfs.openpbr import DEFAULTS, OpenPBRBsdf
@@ -153,7 +154,7 @@ def _interior(passed: Color, depth: float, scatter: ArrayLike, anisotropy: float
         raise SceneError("OpenPBR transmission_color is a texture; with a transmission_depth it is a color")
     tint = np.maximum(color("OpenPBR transmission_color", passed), LEAST_COLOR)
     scattering = rgb("OpenPBR transmission_scatter", scatter, np.inf) / f4(depth)
-    absorption = -np.log(tint.astype(float)) / depth - scattering
+    absorption = -log(tint) / f4(depth) - scattering
     absorption -= min(float(absorption.min()), 0)  # as much as makes all channels absorb
     phase = HenyeyGreenstein(anisotropy) if anisotropy else None
     return Medium(absorption[:, 0], scattering[:, 0], phase=phase)

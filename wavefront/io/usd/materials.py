@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from ...arrays.elementary import sin_cos_turns
 from ...bsdfs import Diffuse, Principled
 from ...codecs.images import decode_codes
 from ...core.errors import SceneError
@@ -131,8 +132,9 @@ class Materials:
         reader = UsdShade.Shader(sources[0].GetPrim()) if sources else None
         if not reader or reader.GetIdAttr().Get() != "UsdTransform2d":
             return None
-        angle = np.radians(float(self._get(reader, "rotation", 0.0)))
-        turn = np.array([[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]])
+        turns = np.array(float(self._get(reader, "rotation", 0.0)) / 360)
+        sin, cos = sin_cos_turns(turns)
+        turn = np.array([[cos, -sin], [sin, cos]])
         out = np.eye(3)
         out[:2, :2] = turn * np.asarray(self._get(reader, "scale", (1, 1)), float)
         out[:2, 2] = np.asarray(self._get(reader, "translation", (0, 0)), float)
