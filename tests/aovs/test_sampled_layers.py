@@ -274,6 +274,7 @@ def assert_same_bits(a: wf.Image, b: wf.Image) -> None:
 
 
 @pytest.mark.parametrize("branches", [1, 2])
+@pytest.mark.first(1)
 def test_bits_depend_on_neither_workers_nor_waves(branches: int) -> None:
     options = {"aovs": EVERYTHING, "branches": branches, "progress": False, "accel": "numpy"}
     one = wf.render(room(12), 13, workers=1, **options)

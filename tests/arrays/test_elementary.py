@@ -147,6 +147,7 @@ def here() -> Any:
 
 
 @pytest.mark.parametrize("name", MACHINES)
+@pytest.mark.first(1)
 def test_pictures_have_the_same_bits_on_every_machine(here: Any, name: str) -> None:
     if __cpu_features__.get("ASIMD"):
         pytest.skip("the groups of instructions are those of x86")

@@ -76,6 +76,7 @@ def test_a_path_keeps_to_the_channel_that_it_follows(inside, roughness):
     )
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("roughness", [0.0, pytest.param(0.5, marks=pytest.mark.slow)])
 def test_pictures_are_those_of_the_indices_one_by_one(roughness):
     """Unbiased: a ball of dispersive glass, also in a mix, against three balls."""

@@ -65,6 +65,7 @@ def test_rough_glass_loses_no_more_than_on_a_sphere():
     assert facets.value == pytest.approx(sphere.value, abs=1e-3)
 
 
+@pytest.mark.slow
 def test_normal_mapped_glass_loses_no_light():
     lean = np.random.default_rng(1).uniform(-0.15, 0.15, (32, 32, 2))
     normal_map = wf.NormalMap(np.concatenate([0.5 + lean, np.ones((32, 32, 1))], 2))

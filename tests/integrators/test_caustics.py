@@ -306,6 +306,7 @@ def test_noise_ends_all_pixels_together() -> None:
 
 
 @pytest.mark.parametrize("sampler", ["independent", pytest.param("sobol", marks=pytest.mark.slow)])
+@pytest.mark.first(1)
 def test_the_standard_error_is_honest(sampler: str) -> None:
     """Over 30 seeds, in the caustic and elsewhere: as large as errors are, or larger where paths are even."""
     settings: dict[str, Any] = {"sampler": sampler, **ALONE}

@@ -37,6 +37,7 @@ def test_direct_light_behind_mirrors_and_glass_agrees() -> None:
 
 
 @pytest.mark.parametrize("max_bounces", [pytest.param(2, marks=pytest.mark.slow), 8])
+@pytest.mark.first(1)
 def test_indirect_light_agrees(max_bounces: int) -> None:
     """Naive and full, with light that took several bounces, caustics among it."""
     naive, full = room("naive", max_bounces, 256), room("full", max_bounces, 128)

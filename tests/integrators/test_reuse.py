@@ -171,7 +171,7 @@ SCENES = [matte_corner, smooth, veiled, blended, divided, balcony, brushed]
 @pytest.mark.parametrize(
     ("spp", "error"), [(16, 0.015), pytest.param(1024, 0.001, marks=pytest.mark.slow)], ids=["quick", "slow"]
 )
-@pytest.mark.first(3)
+@pytest.mark.first(1)
 def test_sharing_keeps_the_mean(build, spp, error, close_tiles):
     """Pure colors, smooth shading, alpha, textures, mixed lobes, media and instances."""
     options = {"max_bounces": 5}
@@ -459,6 +459,7 @@ def test_small_changes_are_found() -> None:
     assert max(wf.compare(1.02 * a, b).p_value for a, b in pairs) < 1e-3
 
 
+@pytest.mark.slow
 def test_the_error_of_a_mean_of_few_samples_is_not_overestimated() -> None:
     """The squares of differences over their errors are 1 in the mean; batches of one sample would say 0.1."""
     scene = scenes.cornell_box((28, 28))

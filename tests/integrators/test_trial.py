@@ -467,6 +467,7 @@ def test_the_error_of_a_cost() -> None:
     assert pairs[0][0].cost_error(replace(pairs[0][1], variance=np.zeros(576)), 0) == 0
 
 
+@pytest.mark.slow
 def test_a_guide_is_used_where_it_pays() -> None:
     """Under an open sky it is not; the picture is that without or with it."""
     for scene, pays in ((open_scene(), False), (lamp_at_the_ceiling(), True)):

@@ -468,6 +468,7 @@ def test_a_sun_before_an_even_sky_gets_all_light_samples() -> None:
     assert (sample.radiance > 0.5).all()
 
 
+@pytest.mark.slow
 def test_compensation_keeps_the_mean() -> None:
     """Of a picture with a sun, with a panel beside it, on a rough metal: as by BSDF samples alone."""
     metal = wf.Conductor.named("gold", roughness=0.7)

@@ -71,6 +71,7 @@ def test_malformed_arguments_are_errors(positions: Any, intensities: Any, messag
         wf.render(scene(wf.PointLights(positions, intensities)), 1)
 
 
+@pytest.mark.slow
 def test_a_million_is_set_up_quickly() -> None:
     places = np.random.default_rng(0).uniform((-3, 1, -3), (3, 7, 3), (10**6, 3))
     begin = time.process_time()

@@ -61,6 +61,7 @@ def test_the_contract_holds_for_each_normal(normal: tuple[float, ...], opaque: b
     testing.check_light(lighting(sky(), normal, opaque, transform=turn), points=[[0, 0, 0]], samples=30_000)
 
 
+@pytest.mark.slow
 def test_a_sum_of_lights_at_infinity_is_sampled_for_normals() -> None:
     """With a sun beside the sky; directions below the surface are as rare as in the sky alone."""
     normals = np.repeat(f4(NORMALS[:2]).T, 50_000, axis=1)

@@ -39,11 +39,13 @@ def test_triangle_light(case: Case, integrator: str) -> None:
 
 
 @pytest.mark.parametrize(**each(scenes.INDIRECT_CASES))
+@pytest.mark.first(6)
 def test_indirect_light(case: Case, integrator: str) -> None:
     assert_mean(run(case, integrator), case.expected, case.max_error)
 
 
 @pytest.mark.parametrize(**each(scenes.SPECULAR_CASES))
+@pytest.mark.first(8)
 def test_specular_light(case: Case, integrator: str) -> None:
     """Glass, metal and mirrors, through which every integrator sees.
 

@@ -144,6 +144,7 @@ def test_a_notebook_that_shows_nothing_ends_no_render(monkeypatch: pytest.Monkey
 
 @pytest.mark.skipif(not LINUX, reason="terminals of Linux")
 @pytest.mark.parametrize("ignored", [False, True])
+@pytest.mark.first(1)
 def test_a_closed_terminal_keeps_the_picture(tmp_path: Path, ignored: bool) -> None:
     """And the checkpoint. The workers are told as well, and the messages have nowhere to go.
 

@@ -104,6 +104,7 @@ def test_scenes_of_scientists_are_short(name):
     assert len([line for line in code.splitlines() if line.strip()]) <= 20
 
 
+@pytest.mark.slow
 def test_furnace_prints_numbers_within_their_errors(run):
     out, picture = run("furnace", "--spp", "16", "--size", "8")
     rows = re.findall(r"^(\D.*?)\s+([\d.]+)\s+([\d.]+)\s+([\d.]+)\s+([+-][\d.]+)%$", out, re.MULTILINE)

@@ -5,6 +5,8 @@ import subprocess
 import sys
 from pathlib import Path
 
+import pytest
+
 GOOD = """
 from __future__ import annotations
 
@@ -68,6 +70,7 @@ BAD = {
 }
 
 
+@pytest.mark.slow
 def test_a_users_script_is_well_typed_and_mistakes_are_found(tmp_path: Path) -> None:
     """By `mypy --strict`, outside of the package's folder; each mistake on its line, so not all is `Any`."""
     (tmp_path / "good.py").write_text(GOOD)

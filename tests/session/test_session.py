@@ -131,6 +131,7 @@ def patient(monkeypatch: pytest.MonkeyPatch) -> None:
 @pytest.mark.usefixtures("patient")
 @pytest.mark.parametrize("executor", EXECUTORS)
 @pytest.mark.parametrize("sampler", ["sobol", "bluenoise"])
+@pytest.mark.first(1)
 def test_another_camera_compiles_nothing_and_starts_no_worker(executor, sampler, monkeypatch):
     """Its picture is that of a render, also in another size, and when the first one was not finished."""
     options = {"sampler": sampler, "workers": 2, "executor": executor, "wave_size": 300, **QUIET}
