@@ -230,6 +230,7 @@ def test_coverage_tells_shapes_apart_by_their_names() -> None:
     assert not parts["hidden"].any()
 
 
+@pytest.mark.slow
 def test_errors_are_those_of_the_samples() -> None:
     """The standard error of an AOV predicts the scatter between seeds."""
     runs = [render(room(6), 16, aovs=SAMPLED, seed=seed, sampler="independent") for seed in range(24)]
@@ -288,6 +289,7 @@ def test_bits_depend_on_neither_workers_nor_waves(branches: int) -> None:
         )
 
 
+@pytest.mark.slow
 def test_bits_stay_in_adaptive_renders_and_sessions() -> None:
     """Where pixels differ in their samples; the last picture of a session is that of `render`."""
     options = {"noise": 0.05, "aovs": EVERYTHING, "progress": False, "accel": "numpy"}

@@ -280,6 +280,7 @@ def test_a_hint_tells_where_light_is_missing(arguments, settings, missing):
     assert (hint is not None and "caustics=True adds them" in hint) == missing
 
 
+@pytest.mark.slow
 def test_shared_paths_leave_out_the_same_light(close_tiles: None) -> None:
     """A lamp in a glass ball lights a room: what paths from lights find at second points counts once."""
     options: dict[str, Any] = {"caustics": True, "max_bounces": 5, "accel": "auto"}

@@ -352,6 +352,7 @@ def test_pixels_of_a_tile_get_their_samples_together(window: tuple[int, int, int
         assert (image.standard_error[there] == plain.standard_error[there]).all()
 
 
+@pytest.mark.slow
 def test_noise_is_the_true_error_where_pixels_share(close_tiles: None) -> None:
     """Pictures of several seeds are as far from the converged one as they say, and as was asked for."""
     scene = scenes.cornell_box((16, 16))
@@ -432,6 +433,7 @@ def without_scatter(image: wf.Image) -> wf.Image:
     )
 
 
+@pytest.mark.slow
 def test_comparisons_allow_for_shared_noise(close_tiles: None) -> None:
     """Blocks of pixels that share noise differ by more than their standard errors say."""
     scene = scenes.cornell_box((32, 32))
@@ -588,6 +590,7 @@ def test_intervals_are_those_of_student() -> None:
         found.interval(95)
 
 
+@pytest.mark.slow
 def test_regions_of_shared_pictures_with_different_counts() -> None:
     """The error is that of the scatter over seeds."""
     scene = below_the_lamp(42)

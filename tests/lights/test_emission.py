@@ -260,6 +260,7 @@ def gallery(size: tuple[int, int] = (16, 8)) -> wf.Scene:
     return wf.Scene(shapes, [wf.PointLight((1, 3, 2), 1.0)], camera)
 
 
+@pytest.mark.slow
 def test_estimators_agree() -> None:
     """All light by chance and by light samples; the point light is left to both."""
     scene = gallery()

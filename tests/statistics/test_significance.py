@@ -98,6 +98,7 @@ def test_false_alarms(draw, spp) -> None:
         assert ((found <= chance).sum(0) <= most(runs, chance)).all(), (found <= chance).mean(0)
 
 
+@pytest.mark.slow
 def test_p_of_the_mean_is_uniform() -> None:
     """Without noise that is hard to estimate; the three channels are independent here."""
     rng = np.random.default_rng(1)
