@@ -12,7 +12,7 @@ from significance import Mean, assert_mean
 
 import wavefront as wf
 from wavefront.sampling.warp import cosine_hemisphere, uniform_sphere
-from wavefront.stages.sensors import RECEIVERS
+from wavefront.stages.sensors import SENSORS
 
 QUIET: dict[str, Any] = {"progress": False, "workers": 1}
 BLACK = wf.Diffuse(0)
@@ -146,7 +146,7 @@ def test_branches_and_guides_change_no_mean(settings: dict[str, Any]) -> None:
 
 @pytest.mark.parametrize(("kind", "warp"), [("irradiance", cosine_hemisphere), ("fluence", uniform_sphere)])
 def test_receivers_weigh_what_they_draw_by_their_density(kind: str, warp: Any) -> None:
-    bsdf, u = RECEIVERS[kind], np.random.default_rng(1).random((2, 4096), np.float32)
+    bsdf, u = SENSORS[kind], np.random.default_rng(1).random((2, 4096), np.float32)
     wo = np.repeat(np.array([[0], [0], [1]], np.float32), 4096, 1)
     sample = bsdf.sample_f(wo, u)
     assert (sample.wi == warp(u)).all()

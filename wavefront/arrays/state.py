@@ -126,9 +126,8 @@ class Paths(Rays):
     left_receiver: Any = None
     # (n,) the path has left its first surface by a lobe that is not a delta lobe; None without light tracing
     left_rough: Bools | None = None
-    receiver: Any = (
-        None  # the BSDF of the sensors at which the paths start (stages/sensors.py); None elsewhere
-    )
+    # BSDF of the sensors at which the paths start (stages/sensors.py); None elsewhere
+    sensor: Any = None
     # for layers (aovs/recorder.py); None unless they are asked for
     depth: Bytes | None = None  # (n,) a `BounceDepth`
     met_rough: Bools | None = None  # (n,) the path has met a surface that is not specular

@@ -38,7 +38,7 @@ def intersect_and_compact(
     With `mis` the light is weighted against light sampling. `keep` returns the lanes of the paths that
     scatter; the others end here.
     """
-    if paths.receiver is not None:
+    if paths.sensor is not None:
         return paths, at_sensors(paths)
     hits, left = intersect(scene, paths), paths.exclude_prim
     paths, hits = alpha_pass_through(scene, paths, hits, sampler, bounce)
@@ -68,7 +68,7 @@ def collect_glow(L: Floats, paths: Paths) -> Paths:
 
 def prepare_shading(scene: CompiledScene, paths: Paths, hits: Hits) -> Shading:
     """Apply absorption along the paths, and prepare their surfaces for shading."""
-    if paths.receiver is not None:
+    if paths.sensor is not None:
         return sensor_shading(scene, paths)
     surface = interaction(scene, paths, hits)
     perturb_normals(scene, surface)

@@ -11,7 +11,7 @@ from ..compile.scene import CompiledScene
 from ..sampling.filters import Filter, box
 from ..sampling.sampler import Dimension, Sampler
 from .inside import stacks_at
-from .sensors import receiver_of_camera
+from .sensors import sensor_of_camera
 
 HALF = np.full((2, 1), 0.5, f4)
 
@@ -28,7 +28,7 @@ def generate(
     filter
         Distributes the samples of a pixel in and around it.
     """
-    n, receiver = len(pixel), receiver_of_camera(camera)
+    n, sensor = len(pixel), sensor_of_camera(camera)
     pixel = camera.address(pixel)
     at = filter(sampler.draw_2d(pixel, sample, 0, Dimension.PIXEL))
     lens = sampler.draw_2d(pixel, sample, 0, Dimension.LENS) if camera.uses_lens else None
@@ -43,10 +43,10 @@ def generate(
         throughput=np.ones((3, n), f4),
         pdf=broadcast(f4(1), n),
         specular=broadcast(np.True_, n),
-        roulette_scale=broadcast(f4(1) if receiver is None else f4(1) / receiver.total, n),
+        roulette_scale=broadcast(f4(1) if sensor is None else f4(1) / sensor.total, n),
         media=stacks_at(scene, origin),
         left_rough=None if scene.specular_surfaces is None else broadcast(np.False_, n),
-        receiver=receiver,
+        sensor=sensor,
     )
 
 

@@ -27,7 +27,7 @@ Warp: TypeAlias = Callable[[Floats], Floats]
 UP = column((0, 0, 1))
 
 
-class Receiver(Bsdf):
+class SensorBsdf(Bsdf):
     """Gathers light of the directions that a warp draws, by weights that are all the same.
 
     Parameters
@@ -61,15 +61,15 @@ class Receiver(Bsdf):
         return BsdfSample(wi, weight, pdf, broadcast(np.False_, wi.shape[1]))
 
 
-RECEIVERS = {
-    "irradiance": Receiver(cosine_hemisphere, cosine_hemisphere_pdf, np.pi, sphere=False),  # ∫ L cosθ dω
-    "fluence": Receiver(uniform_sphere, uniform_sphere_pdf, 4 * np.pi, sphere=True),  # ∫ L dω
+SENSORS = {
+    "irradiance": SensorBsdf(cosine_hemisphere, cosine_hemisphere_pdf, np.pi, sphere=False),  # ∫ L cosθ dω
+    "fluence": SensorBsdf(uniform_sphere, uniform_sphere_pdf, 4 * np.pi, sphere=True),  # ∫ L dω
 }
 
 
-def receiver_of_camera(camera: Camera) -> Receiver | None:
+def sensor_of_camera(camera: Camera) -> SensorBsdf | None:
     """Return what the pixels of a camera gather light with; None where they show what rays meet."""
-    return RECEIVERS[camera.sensor] if camera.scatterings and camera.sensor is not None else None
+    return SENSORS[camera.sensor] if camera.scatterings and camera.sensor is not None else None
 
 
 def at_sensors(paths: Paths) -> Hits:
@@ -91,9 +91,9 @@ def sensor_shading(scene: CompiledScene, paths: Paths) -> Shading:
         material=np.zeros(n, np.intp),
         back_facing=broadcast(np.False_, n),
     )
-    groups: list[tuple[Lanes, Bsdf]] = [(slice(0, n), paths.receiver)]
+    groups: list[tuple[Lanes, Bsdf]] = [(slice(0, n), paths.sensor)]
     receiver = receiver_of(surface, groups) if scene.lights.takes_receiver else None
-    up, volume = np.broadcast_to(UP, normal.shape), np.arange(n) if paths.receiver.transmissive else None
+    up, volume = np.broadcast_to(UP, normal.shape), np.arange(n) if paths.sensor.transmissive else None
     return Shading(
         surface, surface.frame(), up, origin_above(surface), groups, receiver=receiver, volume=volume
     )
