@@ -14,7 +14,6 @@ from ..bsdfs import Bsdf
 from ..core.errors import SceneError, warn_caller
 from ..core.plural import plural
 from ..materials import Material, Opacity
-from ..media import Medium
 from ..shapes import CurvedShape, Instance, Mesh, Shape
 from ..shapes.attributes import ATTRIBUTES
 from ..textures.base import BaseTexture
@@ -87,7 +86,7 @@ def absorption_table(materials: Sequence[Material]) -> Floats | None:
     """Return the absorption behind the surfaces of each material, (3, materials), if there is any."""
     table = np.zeros((3, len(materials)), f4)
     for i, material in enumerate(materials):
-        if isinstance(material.interior, Medium):
+        if material.interior is not None:
             table[:, i] = np.ravel(material.interior.sigma_a)
     return table if table.any() else None
 

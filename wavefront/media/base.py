@@ -41,6 +41,7 @@ class BaseMedium(Parametrized, ABC):
     """What fills the space inside shapes, or around them: absorbs, scatters and emits light."""
 
     phase: PhaseFunction
+    sigma_a: Floats  # (3, 1) absorption per scene unit; for a grid where its density is 1
     scatters: bool  # anywhere, in any channel
     glows: bool  # likewise for emission
 
