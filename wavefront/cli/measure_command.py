@@ -9,16 +9,15 @@ from typing import Any
 from ..arrays.vec import Doubles
 from ..camera import Sensors
 from ..camera.sensors import KINDS
-from ..core.errors import Interrupted, RenderError, SaveError, SceneError
-from ..image import Image
+from ..core.errors import SaveError, SceneError
 from ..measuring import Measurement, grid_points, load_points
 from ..measuring.measure import measured
 from ..measuring.measurement import file_kind
 from ..scene import Scene
 from .command import SCENE_FILE, add_command
-from .messages import ERROR, INTERRUPTED, print_done, print_error, print_note
+from .messages import ERROR, print_done, print_error, print_note
 from .options import add_settings, framing, read_scene, setting_values, size, vector
-from .outputs import save_elsewhere
+from .outputs import save_elsewhere, whole_or_part
 
 
 def add_measure_command(commands: Any) -> None:
@@ -70,17 +69,9 @@ def _measure(options: argparse.Namespace) -> int:
     scene = read_scene(path, options, progress)
     sensors = _sensors_of(path, scene) if given is None else given.above(scene.bounds)
     settings = {**framing(options), **setting_values(options), "progress": progress}
-    image: Image | None
-    status = 0
-    try:
-        command = {"arguments": options.arguments, "folder": options.folder}
-        image = measured(scene, sensors, settings.pop("spp", None), settings, command).image
-    except Interrupted as stop:
-        image, status = stop.image, INTERRUPTED
-        print_note(stop)
-    except RenderError as error:
-        image, status = error.image, ERROR
-        print_error(error)
+    command = {"arguments": options.arguments, "folder": options.folder}
+    spp = settings.pop("spp", None)
+    image, status = whole_or_part(lambda: measured(scene, sensors, spp, settings, command).image)
     return (image is not None and _save(Measurement(image), options.output)) or status
 
 

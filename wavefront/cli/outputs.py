@@ -1,4 +1,4 @@
-"""Where pictures go: those of several scenes, and one that cannot be saved at its path."""
+"""Where pictures go: those of several scenes, parts of pictures, and one that cannot be saved at its path."""
 
 from __future__ import annotations
 
@@ -7,12 +7,26 @@ import tempfile
 from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 
-from ..core.errors import SaveError
+from ..core.errors import Interrupted, RenderError, SaveError
 from ..core.files import make_folder
+from ..image import Image
+from .messages import ERROR, INTERRUPTED, print_error, print_note
 
 PLACE = "{}"  # in a path, stands for the name of the scene's file without extension
 MAX_STEM = 40  # characters of the name of such a picture that are kept
 ALWAYS = ".npz"  # can hold any picture, with all that belongs to it
+
+
+def whole_or_part(render: Callable[[], Image]) -> tuple[Image | None, int]:
+    """Return a picture, or what there is of it if its render is stopped or fails, and the exit status."""
+    try:
+        return render(), 0
+    except Interrupted as stop:
+        print_note(stop)
+        return stop.image, INTERRUPTED
+    except RenderError as error:
+        print_error(error)
+        return error.image, ERROR
 
 
 def output_paths(scenes: Sequence[str], output: str) -> list[str]:

@@ -12,7 +12,7 @@ import numpy as np
 from ..camera import Camera, Sensors
 from ..codecs.display import Display
 from ..codecs.images import check_display, check_writable
-from ..core.errors import Interrupted, RenderError, SaveError, SceneError
+from ..core.errors import SaveError, SceneError
 from ..film.checkpoint import contents_of, read_header
 from ..image import Image
 from ..io.to_scene import SIZE
@@ -23,7 +23,7 @@ from ..viewer import view
 from .command import PICTURE_FILE, SCENE_FILE, add_command
 from .messages import ERROR, INTERRUPTED, print_done, print_error, print_note
 from .options import add_display, add_settings, display_values, read_scene, setting_values, vector
-from .outputs import output_paths, save_elsewhere
+from .outputs import output_paths, save_elsewhere, whole_or_part
 
 
 def add_render_command(commands: Any) -> None:
@@ -121,22 +121,9 @@ def _render_scene(path: str, output: str, options: argparse.Namespace) -> int:
     given = (options.origin, options.view, options.direction)
     if isinstance(scene.camera, Sensors) and all(each is None for each in given):
         raise SceneError(f"{path}: has a sensor that measures light: wavefront measure {path} -o out.csv")
-    image: Image | None
-    status = 0
-    try:
-        image = render_by_command(
-            scene,
-            {"arguments": options.arguments, "folder": options.folder},
-            **_view(path, scene, options),
-            **setting_values(options),
-            progress=progress,
-        )
-    except Interrupted as stop:
-        image, status = stop.image, INTERRUPTED
-        print_note(stop)
-    except RenderError as error:
-        image, status = error.image, ERROR
-        print_error(error)
+    command = {"arguments": options.arguments, "folder": options.folder}
+    settings = {**_view(path, scene, options), **setting_values(options), "progress": progress}
+    image, status = whole_or_part(lambda: render_by_command(scene, command, **settings))
     return (image is not None and _save(image, output, options)) or status
 
 
