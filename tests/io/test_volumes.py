@@ -23,10 +23,10 @@ def test_arrays_of_numpy(tmp_path) -> None:
     np.savez_compressed(tmp_path / "b.npz", density=GRID, temperature=2 * GRID)
     np.savez(tmp_path / "c.npz", GRID)
     for path, name in (("a.npy", None), ("b.npz", "density"), ("c.npz", None)):
-        values, box = wf.load_grid(tmp_path / path, name)
+        values, transform = wf.load_grid(tmp_path / path, name)
         assert values.dtype == np.float32
         np.testing.assert_array_equal(values, GRID)
-        assert box.tolist() == [[0, 0, 0], [1, 1, 1]]
+        np.testing.assert_array_equal(transform, np.eye(4))
     np.testing.assert_array_equal(wf.load_grid(str(tmp_path / "b.npz"), "temperature")[0], 2 * GRID)
 
 
@@ -34,11 +34,10 @@ def test_arrays_of_numpy(tmp_path) -> None:
 def test_volumes_of_mitsuba(tmp_path, channels: int) -> None:
     grid = np.stack([GRID] * channels, -1) * np.arange(1, channels + 1, dtype=np.float32)
     (tmp_path / "a.vol").write_bytes(vol(grid))
-    values, box = wf.load_grid(tmp_path / "a.vol")
+    values, transform = wf.load_grid(tmp_path / "a.vol")
     np.testing.assert_array_equal(values, grid[..., 0] if channels == 1 else grid)
-    assert box.tolist() == [[0, 1, 2], [3, 4, 5]]
-    medium = wf.GridMedium(GRID, box, absorption=1)
-    assert medium.bounds.tolist() == box.tolist()
+    medium = wf.GridMedium(GRID, transform, absorption=1)
+    assert medium.bounds.tolist() == [[0, 1, 2], [3, 4, 5]]
 
 
 @pytest.mark.parametrize(
@@ -53,7 +52,7 @@ def test_volumes_of_mitsuba(tmp_path, channels: int) -> None:
         ("a.vol", vol(GRID, width=-1), "claims -1 × 3"),
         ("a.npy", b"\x93NUMPY", "a.npy"),
         ("a.npz", b"PK", "a.npz"),
-        ("a.vdb", b"", "a.vdb"),
+        ("a.dat", b"", "a.dat: the extension"),
     ],
 )
 def test_damaged_files_are_named(tmp_path, name: str, data: bytes, message: str) -> None:

@@ -76,6 +76,8 @@ EXTRAS = {
     "materialx": Extra(("materialx",), "load_materialx: materials of MaterialX documents"),
     "usd": Extra(("usd-core",), "scenes of USD"),
     "viewer": Extra(("viser",), "wf.view and wavefront view: a scene in the browser"),
+    "nrrd": Extra(("pynrrd",), "load_grid: grids of NRRD for media"),
+    "vti": Extra(("vtk",), "load_grid: grids of VTK, ImageData, for media"),
     "completion": Extra(("shtab",), "completion of this command line in bash and zsh"),
 }
 

@@ -1,10 +1,11 @@
-"""Files of grids for media: arrays of NumPy, and Mitsuba's volumes."""
+"""Files of grids for media: arrays of NumPy, Mitsuba's volumes, and what libraries read."""
 
 from __future__ import annotations
 
 import math
 import struct
 import zipfile
+from collections.abc import Callable
 from io import BytesIO
 
 import numpy as np
@@ -15,26 +16,25 @@ from ..codecs.budget import Budget
 from ..codecs.npz import MAX_HEADER, checked_shape, read_arrays
 from ..core.errors import SceneError, one_of
 from ..core.files import extension_of, path_name, read_bytes
-from ..core.suggestions import did_you_mean
 from .sources import LoadLimits, PathLike, checked_limits
+from .volume_libraries import chosen, placed, read_nrrd, read_vdb, read_vti
 
-EXTENSIONS = (".npy", ".npz", ".vol")
 VOL_HEADER = struct.Struct("<3sBiiiii6f")
 VOL_FLOAT32 = 1
-UNIT = np.array([(0.0, 0, 0), (1, 1, 1)])
 
 
 def load_grid(
     path: PathLike, name: str | None = None, *, limits: LoadLimits | None = None
 ) -> tuple[Floats, Doubles]:
-    """Return a grid of numbers in a file, for `GridMedium`, and the corners of its box.
+    """Return a grid of numbers in a file, for `GridMedium`, and where it is.
 
     Parameters
     ----------
     path
-        A file .npy or .npz of NumPy, with axes z, y, x and perhaps colors; or .vol of Mitsuba.
+        A file .npy or .npz of NumPy, with axes z, y, x and perhaps colors; .vol of Mitsuba; .nrrd, through
+        pynrrd; .vti, ImageData of VTK, through vtk; or .vdb, through the Python module of OpenVDB.
     name
-        Which array of an npz file; not needed where it has one alone.
+        Which array or grid of the file; not needed where it has one alone.
     limits
         Of the size of the file, and of the memory that it may take.
 
@@ -42,50 +42,54 @@ def load_grid(
     -------
     values
         (z, y, x) float32, or (z, y, x, c) with c > 1 channels.
-    box
-        (2, 3) lower and upper corner, scene units; those of the unit cube where the file has none.
+    transform
+        (4, 4) from the unit cube to the box of the grid, scene units; the unit cube itself where the file
+        has none. Values lie at the centers of its voxels.
 
     Raises
     ------
     SceneError
-        If the file is missing, of another kind, damaged or too large, or has no such array.
+        If the file is missing, of another kind, damaged or too large, or has no such array, or if the library
+        that reads it is not installed.
 
     Examples
     --------
     >>> np.save("smoke.npy", np.ones((8, 4, 4), np.float32))
-    >>> density, box = wf.load_grid("smoke.npy")
-    >>> smoke = wf.GridMedium(density, 2 * box, albedo=0.5)
+    >>> density, transform = wf.load_grid("smoke.npy")
+    >>> smoke = wf.GridMedium(density, transform, albedo=0.5)
     """
     limits = checked_limits(limits)
-    text = path_name(path)
-    one_of(f"{text}: the extension", extension_of(path, EXTENSIONS), EXTENSIONS)
+    _reader(path)
     data = read_bytes(path, limits.file_bytes)
     budget = Budget(limits.pixels, limits.memory_bytes)
     budget.add_file(len(data))
-    return parsed_grid(text, data, budget, name)
+    return parsed_grid(path_name(path), data, budget, name)
 
 
 def parsed_grid(path: str, data: bytes, budget: Budget, name: str | None = None) -> tuple[Floats, Doubles]:
     """Return the grid of a file that has been read; see `load_grid`."""
     try:
-        if path.lower().endswith(".vol"):
-            return _vol(data, budget)
-        if path.lower().endswith(".npz"):
-            return _as_grid(_chosen(read_arrays(data, budget), name)), UNIT
-        budget.charge("the array", 2 * math.prod(checked_shape("array", data[:MAX_HEADER], len(data))) * 4)
-        return _as_grid(np.lib.format.read_array(BytesIO(data), allow_pickle=False)), UNIT
+        return _reader(path)(path, data, budget, name)
     except (SceneError, ValueError, OSError, zipfile.BadZipFile) as error:
         raise SceneError(f"{path}: {error}") from error
 
 
-def _chosen(arrays: dict[str, NDArray[np.generic]], name: str | None) -> NDArray[np.generic]:
-    """Return the array of a name, or the only one."""
-    if name is None and len(arrays) == 1:
-        return next(iter(arrays.values()))
-    if name is None or name not in arrays:
-        listed = ", ".join(sorted(arrays)) or "none"
-        raise SceneError(f"name is {name!r}; the arrays are {listed}{did_you_mean(name, list(arrays))}")
-    return arrays[name]
+def _reader(path: PathLike) -> Callable[[str, bytes, Budget, str | None], tuple[Floats, Doubles]]:
+    """Return the function that reads files of a path's extension."""
+    extension = extension_of(path, tuple(READERS))
+    one_of(f"{path_name(path)}: the extension", extension, tuple(READERS))
+    return READERS[extension]
+
+
+def _npy(path: str, data: bytes, budget: Budget, name: str | None) -> tuple[Floats, Doubles]:
+    """Return the array of a file."""
+    budget.charge("the array", 2 * math.prod(checked_shape("array", data[:MAX_HEADER], len(data))) * 4)
+    return _as_grid(np.lib.format.read_array(BytesIO(data), allow_pickle=False)), np.eye(4)
+
+
+def _npz(path: str, data: bytes, budget: Budget, name: str | None) -> tuple[Floats, Doubles]:
+    """Return an array of an archive."""
+    return _as_grid(chosen(read_arrays(data, budget), name)), np.eye(4)
 
 
 def _as_grid(values: NDArray[np.generic]) -> Floats:
@@ -96,7 +100,7 @@ def _as_grid(values: NDArray[np.generic]) -> Floats:
     return np.ascontiguousarray(values, f4)
 
 
-def _vol(data: bytes, budget: Budget) -> tuple[Floats, Doubles]:
+def _vol(path: str, data: bytes, budget: Budget, name: str | None) -> tuple[Floats, Doubles]:
     """Return the grid of a volume of Mitsuba, version 3 (documentation of its plugin gridvolume)."""
     if len(data) < VOL_HEADER.size or data[:3] != b"VOL":
         raise SceneError("is no volume of Mitsuba: it does not begin with VOL and a header")
@@ -111,4 +115,15 @@ def _vol(data: bytes, budget: Budget) -> tuple[Floats, Doubles]:
     budget.charge("the grid", there)
     values = np.frombuffer(data, "<f4", offset=VOL_HEADER.size).reshape(depth, height, width, channels)
     grid = values[..., 0] if channels == 1 else values
-    return np.ascontiguousarray(grid, f4), np.array(box, np.float64).reshape(2, 3)
+    low, high = np.array(box, np.float64).reshape(2, 3)
+    return np.ascontiguousarray(grid, f4), placed(np.diag(high - low), low)
+
+
+READERS = {
+    ".npy": _npy,
+    ".npz": _npz,
+    ".vol": _vol,
+    ".nrrd": read_nrrd,
+    ".vti": read_vti,
+    ".vdb": read_vdb,
+}

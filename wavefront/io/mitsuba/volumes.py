@@ -27,10 +27,8 @@ class Volume(NamedTuple):
 )
 def _grid_volume(node: Node, job: Job) -> Volume:
     path, matrix = job.find(node.text("filename")), node.matrix()
-    values, (low, high) = parsed_grid(os.fspath(path), job.files.read(path), job.files.budget)
+    values, box = parsed_grid(os.fspath(path), job.files.read(path), job.files.budget)
     if node.flag("use_grid_bbox"):
-        box = np.diag([*(high - low), 1.0])
-        box[:3, 3] = low
         matrix = matrix @ box
     if node.choice("filter_type", "trilinear", ("trilinear", "nearest")) == "nearest":
         node.lose("filter_type 'nearest'")
