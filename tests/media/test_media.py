@@ -6,6 +6,7 @@ from scenes import probe
 from significance import Mean, assert_mean, assert_same_images, measure, render, repeat
 
 import wavefront as wf
+from wavefront.arrays.state import SurfaceInteraction
 from wavefront.compile.media import PhaseBsdf
 
 ALL = ("naive", "direct_simple", "direct_mis", "full")
@@ -316,15 +317,40 @@ def test_overlaps_go_to_the_higher_priority(first: int) -> None:
         assert render(scene, 1).rgb == pytest.approx(np.exp(-depth), rel=1e-5)
 
 
-def test_nested_dielectrics() -> None:
+def openpbr(ior: float, priority: int | None = None) -> wf.Material:
+    return wf.OpenPBR(transmission_weight=1, specular_ior=ior, specular_roughness=0, priority=priority)
+
+
+CLEAR = {
+    "dielectric": wf.Dielectric,
+    "principled": lambda ior: wf.Principled(1, 0, 0, ior, 1),
+    "disney": lambda ior: wf.Disney(1, 0, ior=ior, transmission=1),
+    "openpbr": lambda ior: openpbr(ior).bsdf,
+}
+
+
+@pytest.mark.parametrize("clear", CLEAR.values(), ids=CLEAR)
+def test_nested_dielectrics(clear) -> None:
     """A panel in water behind a glass pane that reaches into the water, by Fresnel's reflectances."""
-    glass = block(None, (-9, -9, 0), (9, 9, 1), bsdf=wf.Dielectric(1.5), priority=2)
-    water = block(None, (-9, -9, -9), (9, 9, 0.5), bsdf=wf.Dielectric(1.33), priority=1)
+    glass = block(None, (-9, -9, 0), (9, 9, 1), bsdf=clear(1.5), priority=2)
+    water = block(None, (-9, -9, -9), (9, 9, 0.5), bsdf=clear(1.33), priority=1)
     panel = wf.Rectangle((-1, -1, -1), (2, 0, 0), (0, 2, 0), emission=1, material=wf.Diffuse(0.0))
     scene = wf.Scene([glass, water, panel], camera=probe((0, 0, 0), (0, 0, 5)))
     through = [1 - ((a - b) / (a + b)) ** 2 for a, b in ((1.5, 1.0), (1.5, 1.33))]
     mean = measure(scene, 256, max_bounces=2, integrator="naive", lighting=None)
     assert_mean(mean, through[0] * through[1] / 1.33**2, 0.005)
+
+
+def test_a_coat_of_the_index_around_it_is_not_seen() -> None:
+    up, zero = np.repeat(np.float32([[0], [0], [1]]), 8, 1), np.zeros(8, np.float32)
+    lane, water = np.zeros(8, np.intp), np.full(8, 1.33, np.float32)
+    surface = SurfaceInteraction(0 * up, zero, up, up, up, lane, lane, np.zeros(8, bool), index_around=water)
+    wi = np.float32([[0.6, -0.3, 0.5, 0, 0.6, -0.3, 0.5, 0]] * 2 + [[0.4, 0.5, 0.7, 1, -0.4, -0.5, -0.7, -1]])
+    wi, wo = wi / np.linalg.norm(wi, axis=0), np.float32([[0.6], [0], [0.8]]) * np.ones(8, np.float32)
+    some = {"transmission_weight": 1, "specular_roughness": 0.5}
+    coated = wf.OpenPBR(coat_weight=1, coat_ior=1.33, **some).bsdf.bind(surface).f(wo, wi)
+    np.testing.assert_allclose(coated, wf.OpenPBR(**some).bsdf.bind(surface).f(wo, wi), 1e-4)
+    assert wf.OpenPBR(priority=2).priority == 2
 
 
 def test_more_than_four_shapes_around_a_path() -> None:

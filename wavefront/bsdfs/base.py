@@ -97,6 +97,11 @@ class Bsdf(Parametrized, ABC):
         return self.transmissive and not getattr(self, "thin", False)
 
     @property
+    def index_inside(self) -> Any:
+        """Index of refraction of what the surface encloses, an array or a texture; None if it has none."""
+        return getattr(self, "ior", None)
+
+    @property
     def lambertian(self) -> bool:
         """True if f is albedo/π and the pdf is cosθ/π above the surface; then both follow from cosines."""
         return False

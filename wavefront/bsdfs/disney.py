@@ -153,6 +153,8 @@ class Disney(DisneyBase):
         """Return the BSDF bound to `surface`, with the side of `wo`."""
         bound = copy(super().bind(surface))
         bound._behind = surface.back_facing if self.transmissive else None
+        if surface.index_around is not None:
+            vars(bound)["ior"] = bound.ior / surface.index_around  # not by assignment, which would check it
         return bound
 
     def evaluate(self, wo: Floats, wi: Floats) -> tuple[Floats, Floats]:

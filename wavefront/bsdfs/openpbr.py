@@ -120,6 +120,12 @@ class OpenPBRBsdf(JointBsdf):
         """True if the surface is a sheet."""
         return self.geometry_thin_walled
 
+    @property
+    def index_inside(self) -> Any:
+        """Index of refraction of the clear part, which `specular_weight` changes."""
+        varies = any(isinstance(each, BaseTexture) for each in (self.specular_ior, self.specular_weight))
+        return self.specular_ior if varies else weighted_index(self.specular_ior, self.specular_weight)
+
     def derive(self) -> None:
         """Set which lobes exist, and the layers where all parameters are constants."""
         used = {name for name, value in vars(self).items() if isinstance(value, BaseTexture) or np.any(value)}
@@ -148,6 +154,9 @@ class OpenPBRBsdf(JointBsdf):
     def bind(self, surface: SurfaceInteraction) -> Self:
         """Return the BSDF bound to `surface`, with the side of `wo`."""
         bound = copy(super().bind(surface))
+        if surface.index_around is not None and self.encloses:
+            for name in ("specular_ior", "coat_ior"):  # relative to what is around
+                vars(bound)[name] = getattr(bound, name) / surface.index_around
         bound._layers = bound._filled(copy(self._layers).bind(surface))
         return bound
 
@@ -196,7 +205,7 @@ class OpenPBRBsdf(JointBsdf):
             film_ior=self.thin_film_ior,
             clearcoat=self.coat_weight,
             clearcoat_roughness=self.coat_roughness,
-            coat_ior=self.coat_ior,
+            coat_ior=np.maximum(self.coat_ior, f4(1) / self.coat_ior),
             coat_color=self.coat_color,
             darkening=self.coat_darkening * self.coat_weight,
             sheen=self.fuzz_weight,
@@ -221,6 +230,9 @@ class Layers(Principled):
     coat_ior: Floats  # (n,)
     coat_color: Floats  # (3, n)
     darkening: Floats  # (n,)
+
+    def _set_around(self, index: Floats) -> None:
+        """Nothing: `OpenPBRBsdf` gives them relative indices."""
 
     def evaluate(self, wo: Floats, wi: Floats) -> tuple[Floats, Floats]:
         """Return `f` and `pdf` of all lobes: the base, then coat and fuzz layered over it."""

@@ -83,7 +83,8 @@ class Principled(RoughBsdf):
         exactly, also without multiple scattering.
     multiscatter
         Return what the microfacets of metal and clear parts scatter more than once, as in `Conductor` and
-        `Dielectric`; not in clear parts that bend light with an index by texture or a film.
+        `Dielectric`; not in clear parts that bend light with an index by texture or a film, or in scenes with
+        a `priority`.
 
     Raises
     ------
@@ -177,7 +178,14 @@ class Principled(RoughBsdf):
         if self.transmissive and not self.thin:
             bound = copy(bound)
             bound.back_facing = surface.back_facing
+            if surface.index_around is not None:
+                bound._clear_again = False  # its tables are those of one index
+                bound._set_around(surface.index_around)
         return bound
+
+    def _set_around(self, index: Floats) -> None:
+        """Make the index relative to that of what is around, (n,)."""
+        vars(self)["ior"] = self.ior / index
 
     def albedo(self, wo: Floats) -> Floats:
         """Return about the albedo of all lobes, layered as in `evaluate`."""

@@ -263,7 +263,7 @@ def _check_apart(shapes: Sequence[Shape]) -> None:
 
 def _index(material: Material) -> float:
     """Return the index of refraction of what a material encloses, if it has a priority."""
-    index = getattr(material.bsdf, "ior", None)
+    index = material.bsdf.index_inside
     if material.priority is None or index is None or material.bsdf.invisible:
         return 1.0
     if isinstance(index, BaseTexture) or np.size(index) != 1:

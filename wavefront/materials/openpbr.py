@@ -57,7 +57,7 @@ class OpenPBR(Material):
         The surface is a sheet.
     geometry_normal
         A `NormalMap` or `BumpMap`.
-    name
+    priority, name
         As for `Material`.
 
     Raises
@@ -107,6 +107,7 @@ class OpenPBR(Material):
         geometry_opacity: Scalar = 1.0,
         geometry_thin_walled: bool = False,
         geometry_normal: BaseNormalMap | None = None,
+        priority: int | None = None,
         name: str | None = None,
     ) -> None:
         given = locals()
@@ -132,6 +133,7 @@ class OpenPBR(Material):
             normal_map=geometry_normal,
             emission=_emission(_amount("emission_luminance", emission_luminance), emission_color),
             interior=interior,
+            priority=priority,
             name=name,
         )
 
