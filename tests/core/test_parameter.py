@@ -1,7 +1,9 @@
 """Parameters are checked when they are assigned, as they are in the constructor, and shown."""
 
 import copy
+import inspect
 import pickle
+from typing import Literal, get_type_hints
 
 import numpy as np
 import pytest
@@ -319,3 +321,15 @@ def test_arrays_that_do_not_fit_each_other_are_refused_by_render() -> None:
     mesh.vertices = np.eye(4)[:, :3]
     with pytest.raises(wf.SceneError, match=r"mesh: normals must have a row for each of 4 vertices, got 3"):
         wf.render(mesh, 1)
+
+
+def test_constructors_are_made_of_the_parameters():
+    signature = inspect.signature(wf.Dielectric)
+    assert list(signature.parameters)[:3] == ["ior", "roughness", "roughness_v"]  # a base's keywords first
+    assert signature.parameters["roughness"].annotation == "Scalar"
+    assert signature.parameters["film_ior"].default == wf.Dielectric.defaults["film_ior"] == 1.33
+    assert get_type_hints(wf.Conductor.__init__)["distribution"] == Literal["ggx", "beckmann"]
+    with pytest.raises(TypeError, match=r"Conductor.__init__\(\) missing .* 'eta' and 'k'"):
+        wf.Conductor()
+    with pytest.raises(TypeError, match=r"Principled\(\) got .* 'specular_weight'; did you mean 'specular'"):
+        wf.Principled(specular_weight=1)

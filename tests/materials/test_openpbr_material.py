@@ -6,20 +6,20 @@ import numpy as np
 import pytest
 
 import wavefront as wf
-from wavefront.bsdfs.openpbr import DEFAULTS
+from wavefront.bsdfs.openpbr import OpenPBRBsdf
 
 
 def test_the_defaults_are_those_of_the_bsdf():
     given = {name: each.default for name, each in inspect.signature(wf.OpenPBR).parameters.items()}
-    assert {name: given[name] for name in DEFAULTS if name in given} == {
-        name: value for name, value in DEFAULTS.items() if name != "multiscatter"
+    assert {name: given[name] for name in OpenPBRBsdf.defaults if name in given} == {
+        name: value for name, value in OpenPBRBsdf.defaults.items() if name != "multiscatter"
     }
     plain = wf.OpenPBR()
     assert plain.interior is plain.emission is plain.opacity is plain.normal_map is plain.name is None
 
 
 def test_every_parameter_reaches_the_bsdf():
-    for name in DEFAULTS.keys() - {"multiscatter"}:
+    for name in OpenPBRBsdf.defaults.keys() - {"multiscatter"}:
         value = True if name == "geometry_thin_walled" else 1.25 if name.endswith("ior") else 0.37
         if name.startswith("subsurface_weight"):
             continue

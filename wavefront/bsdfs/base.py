@@ -73,6 +73,7 @@ class Bsdf(Parametrized, ABC):
     dimensions: int = 2  # rows of u that sample_f reads
     given_elsewhere: ClassVar[dict[str, str]] = MATERIAL_ARGUMENTS  # for messages
     specular: bool = False  # every lobe is a delta: f and pdf are 0, light sampling is skipped
+    back_facing: Bools | None = None  # (n,) wo is on the back, for some that are bound; unbound, on the front
 
     if not TYPE_CHECKING:  # a type checker would take every name for an attribute
 

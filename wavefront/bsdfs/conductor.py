@@ -9,16 +9,16 @@ import numpy as np
 
 from ..arrays.vec import Floats, broadcast, f4
 from ..core.errors import one_of
-from ..core.parameter import Parameter
+from ..core.parameter import Parameter, parametrized
 from ..core.suggestions import suggests_keywords
 from ..textures.base import BaseTexture
-from ..textures.parameter import MAX_INDEX, Color, Scalar, color, refractive_index
+from ..textures.parameter import MAX_INDEX, Color, Scalar, color, refractive_index, scalar
 from .base import BsdfSample, weigh
 from .energy import gain, mean_over_cosines
 from .fresnel import fresnel_conductor
 from .microfacet import reflect
 from .mirror import mirrored
-from .rough import Distribution, RoughBsdf, Shadowing
+from .rough import RoughBsdf
 from .thin_film import film_reflectance, has_film, thickness
 
 # η and k of metals in linear Rec. 709 RGB: published measurements, weighted by the matching
@@ -40,6 +40,7 @@ METALS = {
 SPELLINGS = {"aluminium": "aluminum", "chrome": "chromium"}
 
 
+@parametrized
 class Conductor(RoughBsdf):
     """A metal, by its complex refractive index η + ik: smooth, or rough.
 
@@ -82,34 +83,12 @@ class Conductor(RoughBsdf):
     >>> metal = wf.Conductor(eta=(1.5, 1.0, 0.6), k=(7.6, 6.6, 5.4))
     """
 
-    eta = Parameter(partial(color, high=MAX_INDEX, above_zero=True))
-    k = Parameter(partial(color, high=MAX_INDEX))
-    reflectance = Parameter(color)
-    film_thickness = Parameter(thickness)
-    film_ior = Parameter(refractive_index)
-
-    @suggests_keywords
-    def __init__(
-        self,
-        eta: Color,
-        k: Color,
-        roughness: Scalar = 0.0,
-        *,
-        roughness_v: Scalar | None = None,
-        rotation: Scalar = 0.0,
-        distribution: Distribution = "ggx",
-        shadowing: Shadowing = "correlated",
-        film_thickness: Scalar = 0.0,
-        film_ior: Scalar = 1.33,
-        reflectance: Color = 1.0,
-        multiscatter: bool = True,
-    ) -> None:
-        self.eta = eta
-        self.k = k
-        self.reflectance = reflectance
-        self.film_thickness, self.film_ior = film_thickness, film_ior
-        self._set_facets(roughness, roughness_v, rotation, distribution, shadowing, multiscatter)
-        self.derive()
+    eta: Parameter[Color] = Parameter(partial(color, high=MAX_INDEX, above_zero=True))
+    k: Parameter[Color] = Parameter(partial(color, high=MAX_INDEX))
+    roughness: Parameter[Scalar] = Parameter(scalar, default=0.0)
+    film_thickness: Parameter[Scalar] = Parameter(thickness, default=0.0, kw_only=True)
+    film_ior: Parameter[Scalar] = Parameter(refractive_index, default=1.33, kw_only=True)
+    reflectance: Parameter[Color] = Parameter(color, default=1.0, kw_only=True)
 
     def derive(self) -> None:
         """Set `specular` from the roughness, whether there is a film, and the mean of constants."""

@@ -8,9 +8,9 @@ from typing import Self
 import numpy as np
 
 from ..arrays.state import SurfaceInteraction
-from ..arrays.vec import BELOW_ONE, Bools, Floats, broadcast, dot, f4
+from ..arrays.vec import BELOW_ONE, Floats, broadcast, dot, f4
 from ..core.errors import one_of
-from ..core.parameter import Parameter
+from ..core.parameter import Parameter, parametrized
 from ..core.suggestions import suggests_keywords
 from ..textures.base import BaseTexture
 from ..textures.parameter import Color, Scalar, refractive_index, refractive_indices
@@ -20,7 +20,6 @@ from .energy import Loss, gain, loss
 from .fresnel import fresnel_dielectric
 from .microfacet import reflect, refract
 from .refractive import RefractiveBsdf
-from .rough import Distribution, Shadowing
 from .thin_film import has_film, thickness
 
 # Closer to 1 than this, refraction bends light by less than half vectors resolve: the boundary is smooth.
@@ -52,6 +51,7 @@ INDICES = {
 }
 
 
+@parametrized
 class Dielectric(RefractiveBsdf):
     """Glass, water and other clear dielectrics: a boundary that reflects and refracts.
 
@@ -90,40 +90,11 @@ class Dielectric(RefractiveBsdf):
     >>> prism = wf.Dielectric((1.50, 1.51, 1.53))
     """
 
-    ior = Parameter(refractive_indices)
-    film_thickness = Parameter(thickness)
-    film_ior = Parameter(refractive_index)
+    ior: Parameter[Color] = Parameter(refractive_indices, default=1.5)
+    film_thickness: Parameter[Scalar] = Parameter(thickness, default=0.0, kw_only=True)
+    film_ior: Parameter[Scalar] = Parameter(refractive_index, default=1.33, kw_only=True)
 
-    _inside: Bools = np.zeros(1, np.bool_)  # (n,) wo is inside
-
-    @suggests_keywords
-    def __init__(
-        self,
-        ior: Color = 1.5,
-        roughness: Scalar = 0.0,
-        *,
-        reflectance: Color = 1.0,
-        transmittance: Color = 1.0,
-        roughness_v: Scalar | None = None,
-        rotation: Scalar = 0.0,
-        distribution: Distribution = "ggx",
-        shadowing: Shadowing = "correlated",
-        film_thickness: Scalar = 0.0,
-        film_ior: Scalar = 1.33,
-        multiscatter: bool = True,
-    ) -> None:
-        self.film_thickness, self.film_ior = film_thickness, film_ior
-        super().__init__(
-            ior,
-            roughness,
-            reflectance=reflectance,
-            transmittance=transmittance,
-            roughness_v=roughness_v,
-            rotation=rotation,
-            distribution=distribution,
-            shadowing=shadowing,
-            multiscatter=multiscatter,
-        )
+    _inside = np.zeros(1, np.bool_)  # (n,) wo is inside
 
     @classmethod
     @suggests_keywords

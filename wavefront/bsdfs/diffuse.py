@@ -5,14 +5,14 @@ from __future__ import annotations
 import numpy as np
 
 from ..arrays.vec import INV_PI, Floats, broadcast
-from ..core.parameter import Parameter
-from ..core.suggestions import suggests_keywords
+from ..core.parameter import Parameter, parametrized
 from ..sampling.warp import cosine_hemisphere, cosine_hemisphere_pdf
 from ..textures.base import BaseTexture
 from ..textures.parameter import Color, color
 from .base import Bsdf, BsdfSample
 
 
+@parametrized
 class Diffuse(Bsdf):
     """A diffuse (Lambertian) surface, equally bright from all directions: f = reflectance/π.
 
@@ -33,11 +33,7 @@ class Diffuse(Bsdf):
     >>> checks = wf.Diffuse(wf.Texture([[0.1, 0.8], [0.8, 0.1]], filter="nearest"))
     """
 
-    reflectance = Parameter(color)
-
-    @suggests_keywords
-    def __init__(self, reflectance: Color = 0.5) -> None:
-        self.reflectance = reflectance
+    reflectance: Parameter[Color] = Parameter(color, default=0.5)
 
     @property
     def view_independent(self) -> bool:

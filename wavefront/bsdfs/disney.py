@@ -9,34 +9,36 @@ import numpy as np
 
 from ..arrays.elementary import exp, log, sin_cos_turns
 from ..arrays.state import SurfaceInteraction
-from ..arrays.vec import INV_PI, TINY, Bools, Floats, broadcast, dot, f4, luminance
-from ..core.parameter import Parameter
-from ..core.suggestions import suggests_keywords
+from ..arrays.vec import INV_PI, TINY, Floats, broadcast, dot, f4, luminance
+from ..core.parameter import Parameter, parametrized
 from ..sampling.warp import cosine_hemisphere, cosine_hemisphere_pdf
 from ..textures.base import BaseTexture
 from ..textures.parameter import Color, Scalar, color, refractive_index, scalar
 from .base import BsdfSample, weigh
 from .fresnel import fresnel_dielectric
 from .microfacet import SMOOTH, Facets, reflect, refract
-from .rough import RoughBsdf, Tangent
+from .rough import Microfacets, Tangent
 
 COAT_F0 = f4(0.04)
 COAT_SHADOWS = Facets(np.full(1, 0.25, f4), separable=True)
 
 
-class DisneyBase(RoughBsdf):
+@parametrized
+class DisneyBase(Microfacets):
     """What Disney's materials for solids and for thin sheets have in common."""
 
     dimensions = 3
 
-    base_color = Parameter(color)
-    anisotropic = Parameter(scalar)
-    ior = Parameter(refractive_index)
-    transmission = Parameter(scalar)
-    specular_tint = Parameter(scalar)
-    sheen = Parameter(scalar)
-    sheen_tint = Parameter(scalar)
-    flatness = Parameter(scalar)
+    base_color: Parameter[Color] = Parameter(color, default=0.5)
+    roughness: Parameter[Scalar] = Parameter(scalar, default=0.5)
+    anisotropic: Parameter[Scalar] = Parameter(scalar, default=0.0, kw_only=True)
+    ior: Parameter[Scalar] = Parameter(refractive_index, default=1.5, kw_only=True)
+    transmission: Parameter[Scalar] = Parameter(scalar, default=0.0, kw_only=True)
+    specular_tint: Parameter[Scalar] = Parameter(scalar, default=0.0, kw_only=True)
+    sheen: Parameter[Scalar] = Parameter(scalar, default=0.0, kw_only=True)
+    sheen_tint: Parameter[Scalar] = Parameter(scalar, default=0.0, kw_only=True)
+    flatness: Parameter[Scalar] = Parameter(scalar, default=0.0, kw_only=True)
+    shadowing = "separable"
 
     def derive(self) -> None:
         """Set the direction of the facets."""
@@ -80,6 +82,7 @@ class DisneyBase(RoughBsdf):
         return hue * (self.sheen * part * _fifth(cos))
 
 
+@parametrized
 class Disney(DisneyBase):
     """Disney's principled material, with the formulas of Mitsuba 3's `principled`.
 
@@ -114,35 +117,9 @@ class Disney(DisneyBase):
     >>> paint = wf.Disney((0.2, 0.1, 0.6), 0.4, clearcoat=1, flatness=0.5)
     """
 
-    _behind: Bools | None = None  # (n,) wo is inside; unbound, it is outside
-
-    metallic = Parameter(scalar)
-    clearcoat = Parameter(scalar)
-    clearcoat_gloss = Parameter(scalar)
-
-    @suggests_keywords
-    def __init__(
-        self,
-        base_color: Color = 0.5,
-        roughness: Scalar = 0.5,
-        metallic: Scalar = 0.0,
-        *,
-        anisotropic: Scalar = 0.0,
-        ior: Scalar = 1.5,
-        transmission: Scalar = 0.0,
-        specular_tint: Scalar = 0.0,
-        sheen: Scalar = 0.0,
-        sheen_tint: Scalar = 0.0,
-        flatness: Scalar = 0.0,
-        clearcoat: Scalar = 0.0,
-        clearcoat_gloss: Scalar = 0.0,
-    ) -> None:
-        self.base_color, self.metallic, self.anisotropic = base_color, metallic, anisotropic
-        self._set_facets(roughness, None, 0.0, "ggx", "separable")
-        self.ior, self.transmission = ior, transmission
-        self.specular_tint, self.sheen, self.sheen_tint = specular_tint, sheen, sheen_tint
-        self.flatness, self.clearcoat, self.clearcoat_gloss = flatness, clearcoat, clearcoat_gloss
-        self.derive()
+    metallic: Parameter[Scalar] = Parameter(scalar, default=0.0)
+    clearcoat: Parameter[Scalar] = Parameter(scalar, default=0.0, kw_only=True)
+    clearcoat_gloss: Parameter[Scalar] = Parameter(scalar, default=0.0, kw_only=True)
 
     def derive(self) -> None:
         """Set whether light crosses the surface, and the direction of the facets."""
@@ -152,7 +129,7 @@ class Disney(DisneyBase):
     def bind(self, surface: SurfaceInteraction) -> Self:
         """Return the BSDF bound to `surface`, with the side of `wo`."""
         bound = copy(super().bind(surface))
-        bound._behind = surface.back_facing if self.transmissive else None
+        bound.back_facing = surface.back_facing if self.transmissive else None
         if surface.index_around is not None:
             vars(bound)["ior"] = bound.ior / surface.index_around  # not by assignment, which would check it
         return bound
@@ -199,7 +176,7 @@ class Disney(DisneyBase):
     def _lobes(self, wo: Floats) -> tuple[Floats, ...]:
         """Front (1 or 0), index, weight of transmission; chances of gloss, coat and base, (n,) each."""
         n = wo.shape[1]
-        behind = np.zeros(n, np.bool_) if self._behind is None else self._behind
+        behind = np.zeros(n, np.bool_) if self.back_facing is None else self.back_facing
         front = np.where(behind, f4(0), f4(1))
         clear = (f4(1) - self.metallic) * self.transmission * np.ones_like(front)
         coat = f4(0.25) * self.clearcoat * front

@@ -7,16 +7,16 @@ from functools import partial
 import numpy as np
 
 from ..arrays.vec import INV_PI, Floats, broadcast, dot, f4
-from ..core.parameter import Parameter
-from ..core.suggestions import suggests_keywords
+from ..core.parameter import Parameter, parametrized
 from ..sampling.warp import cosine_hemisphere
-from ..textures.parameter import Color, Scalar, scalar
+from ..textures.parameter import Scalar, scalar
 from .base import BsdfSample, weigh
 from .disney import DisneyBase
 from .fresnel import fresnel_dielectric
 from .microfacet import Facets, reflect
 
 
+@parametrized
 class ThinDisney(DisneyBase):
     """Disney's principled material for sheets such as leaves and paper, with Mitsuba's formulas.
 
@@ -54,29 +54,9 @@ class ThinDisney(DisneyBase):
 
     transmissive = True
 
-    diffuse_transmission = Parameter(partial(scalar, holds=lambda x: 0 <= x <= 2, limit="in [0, 2]"))
-
-    @suggests_keywords
-    def __init__(
-        self,
-        base_color: Color = 0.5,
-        roughness: Scalar = 0.5,
-        *,
-        anisotropic: Scalar = 0.0,
-        ior: Scalar = 1.5,
-        transmission: Scalar = 0.0,
-        diffuse_transmission: Scalar = 0.0,
-        specular_tint: Scalar = 0.0,
-        sheen: Scalar = 0.0,
-        sheen_tint: Scalar = 0.0,
-        flatness: Scalar = 0.0,
-    ) -> None:
-        self.base_color, self.anisotropic = base_color, anisotropic
-        self._set_facets(roughness, None, 0.0, "ggx", "separable")
-        self.ior, self.transmission, self.diffuse_transmission = ior, transmission, diffuse_transmission
-        self.specular_tint, self.sheen, self.sheen_tint = specular_tint, sheen, sheen_tint
-        self.flatness = flatness
-        self.derive()
+    diffuse_transmission: Parameter[Scalar] = Parameter(
+        partial(scalar, holds=lambda x: 0 <= x <= 2, limit="in [0, 2]"), default=0.0, kw_only=True
+    )
 
     def evaluate(self, wo: Floats, wi: Floats) -> tuple[Floats, Floats]:
         """Return `f` and `pdf` of the lobes on the side of wi."""

@@ -28,7 +28,7 @@ from .microfacet import Facets, alpha_of, reflect, refract
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from .rough import RoughBsdf
+    from .rough import Microfacets
 
 COLUMNS = 32  # of a table, by the angle to the normal
 FINE = 1024  # of a table of one row, in the end
@@ -74,12 +74,12 @@ class Loss(NamedTuple):
     passed: float  # mean transmittance of a smooth boundary
     ior: float
 
-    def at(self, bsdf: RoughBsdf, w: Floats, inside: Bools) -> Floats:
+    def at(self, bsdf: Microfacets, w: Floats, inside: Bools) -> Floats:
         """Return L of directions w (3, n) on the inside or not, (n,)."""
         return _directional(bsdf, self.lost, _place_of_refraction(bsdf.facets(), w), inside)
 
     def lobe(
-        self, bsdf: RoughBsdf, wo: Floats, wi: Floats, inside: Bools, chance: Floats | None = None
+        self, bsdf: Microfacets, wo: Floats, wi: Floats, inside: Bools, chance: Floats | None = None
     ) -> tuple[Floats, Floats, Floats]:
         """Return value and density, and the probability to sample it, if it is not known, (n,) each."""
         below = wi[2] < 0
@@ -90,7 +90,7 @@ class Loss(NamedTuple):
         value = chance * self.at(bsdf, wi, inside != below) * part * scale
         return value, bsdf.facets().wide_pdf(wi) * part, chance
 
-    def directions(self, bsdf: RoughBsdf, u: Floats, inside: Bools, lanes: Ints) -> Floats:
+    def directions(self, bsdf: Microfacets, u: Floats, inside: Bools, lanes: Ints) -> Floats:
         """Return directions of the lobe (3, k) on some lanes, for u (3, n) and wo inside or not."""
         crossing = np.broadcast_to(self._sides(bsdf, inside)[2], u[2].shape).take(lanes)
         u = u.take(lanes, 1)
@@ -100,7 +100,7 @@ class Loss(NamedTuple):
         wi[2] *= np.where(f4(2) * u[2] - second < crossing, f4(-1), f4(1))
         return wi
 
-    def _sides(self, bsdf: RoughBsdf, inside: Bools) -> tuple[Floats, Floats, Floats]:
+    def _sides(self, bsdf: Microfacets, inside: Bools) -> tuple[Floats, Floats, Floats]:
         """Return the means here and beyond, and the part of the lobe that is beyond the boundary."""
         here, beyond = (_of_roughness(bsdf, self.means, side) for side in (inside, ~inside))
         return here, beyond, f4(self.passed) * np.minimum(here, beyond) / here
@@ -112,7 +112,7 @@ def mean_over_cosines(reflectance: Callable[[Floats], Floats]) -> Floats:
     return sum(others, first)
 
 
-def gain(bsdf: RoughBsdf, wo: Floats, wi: Floats, mean_reflectance: Floats | None = None) -> Floats:
+def gain(bsdf: Microfacets, wo: Floats, wi: Floats, mean_reflectance: Floats | None = None) -> Floats:
     """Return by how much reflection grows, (n,); of a metal with a mean reflectance (3, n)."""
     table, facets = scaling(bsdf.shape).factor, bsdf.facets()
     one, other = (_directional(bsdf, table, _place_of_masking(facets, w)) for w in (wo, wi))
@@ -121,7 +121,7 @@ def gain(bsdf: RoughBsdf, wo: Floats, wi: Floats, mean_reflectance: Floats | Non
     return f4(1) + (one * other - f4(1)) * part_kept(bsdf, mean_reflectance)
 
 
-def part_kept(bsdf: RoughBsdf, mean_reflectance: Floats) -> Floats:
+def part_kept(bsdf: Microfacets, mean_reflectance: Floats) -> Floats:
     """Return the part that a metal keeps of what it scatters more than once, beside the first F, (3, n).
 
     It is F·M/(1 − F·(1 − M)), with M the mean albedo of single scattering (Kulla and Conty).
@@ -141,7 +141,7 @@ def _place_of_refraction(facets: Facets, w: Floats) -> Place:
     return facets.turn(w), np.sqrt(np.minimum(f4(0.5) * (z + z / facets.stretched(w)), f4(1)))
 
 
-def _directional(bsdf: RoughBsdf, table: Floats, place: Place, side: Bools | int = 0) -> Floats:
+def _directional(bsdf: Microfacets, table: Floats, place: Place, side: Bools | int = 0) -> Floats:
     """Return what a table (sides, rows, columns) has for directions at a place, (n,)."""
     turn, column = place
     if table.shape[1] == 1:
@@ -150,7 +150,7 @@ def _directional(bsdf: RoughBsdf, table: Floats, place: Place, side: Bools | int
     return interpolate(table, bsdf.mean_roughness() if bsdf.shape.alpha is None else turn, column, side)
 
 
-def _of_roughness(bsdf: RoughBsdf, table: Floats, side: Bools | int = 0) -> Floats:
+def _of_roughness(bsdf: Microfacets, table: Floats, side: Bools | int = 0) -> Floats:
     """Return what a table (sides, r) has for the roughness, (n,) or (1,)."""
     if table.shape[1] == 1:
         return table.ravel().take(np.atleast_1d(side).astype(np.intp))

@@ -62,7 +62,7 @@ class Measured(JointBsdf):
     >>> varnish = wf.Measured.from_bytes("varnish.binary", file)  # or wf.Measured("varnish.binary")
     """
 
-    rotation = Parameter(partial(scalar, holds=np.isfinite, limit="finite"))
+    rotation: Parameter[Scalar] = Parameter(partial(scalar, holds=np.isfinite, limit="finite"))
 
     def __init__(self, path: str | os.PathLike[str], *, rotation: Scalar = 0.0) -> None:
         self._fill(path_name(path), read_bytes(path, MOST_BYTES), rotation)

@@ -5,12 +5,12 @@ from __future__ import annotations
 import numpy as np
 
 from ..arrays.vec import Floats
-from ..core.parameter import Parameter
-from ..core.suggestions import suggests_keywords
+from ..core.parameter import Parameter, parametrized
 from ..textures.parameter import Color, color
 from .base import Bsdf, BsdfSample
 
 
+@parametrized
 class Mirror(Bsdf):
     """An ideal mirror, which reflects the same fraction of the light at every angle.
 
@@ -38,11 +38,7 @@ class Mirror(Bsdf):
 
     specular = True
 
-    reflectance = Parameter(color)
-
-    @suggests_keywords
-    def __init__(self, reflectance: Color = 1.0) -> None:
-        self.reflectance = reflectance
+    reflectance: Parameter[Color] = Parameter(color, default=1.0)
 
     def albedo(self, wo: Floats) -> Floats:
         """Return the reflectance."""

@@ -10,8 +10,7 @@ import numpy as np
 from ..arrays.state import SurfaceInteraction
 from ..arrays.vec import BELOW_ONE, Bools, Floats, f4
 from ..core.errors import SceneError
-from ..core.parameter import Parameter
-from ..core.suggestions import suggests_keywords
+from ..core.parameter import Parameter, parametrized
 from ..textures.parameter import Scalar, scalar
 from .base import Bsdf, BsdfSample, JointBsdf, weigh
 
@@ -23,6 +22,7 @@ def _component(name: str, value: Any) -> Bsdf:
     return value
 
 
+@parametrized
 class Mix(JointBsdf):
     """A blend of two BSDFs: (1 − weight)·first + weight·second.
 
@@ -45,15 +45,9 @@ class Mix(JointBsdf):
 
     dimensions = 3
 
-    first = Parameter(_component)
-    second = Parameter(_component)
-    weight = Parameter(scalar)
-
-    @suggests_keywords
-    def __init__(self, first: Bsdf, second: Bsdf, weight: Scalar = 0.5) -> None:
-        self.first, self.second = first, second
-        self.weight = weight
-        self.derive()
+    first: Parameter[Bsdf] = Parameter(_component)
+    second: Parameter[Bsdf] = Parameter(_component)
+    weight: Parameter[Scalar] = Parameter(scalar, default=0.5)
 
     def derive(self) -> None:
         """Set the flags from those of both BSDFs."""

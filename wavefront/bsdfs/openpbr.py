@@ -15,9 +15,9 @@ import numpy as np
 from ..arrays.elementary import exp, log
 from ..arrays.state import SurfaceInteraction
 from ..arrays.vec import INV_PI, TINY, Floats, f4
-from ..core.parameter import Parameter
+from ..core.parameter import Parameter, flag, parametrized
 from ..textures.base import BaseTexture
-from ..textures.parameter import color, refractive_index, scalar
+from ..textures.parameter import Color, Scalar, color, refractive_index, scalar
 from .albedo import dielectric_albedo
 from .base import BsdfSample, JointBsdf
 from .energy import Shape, mean_over_cosines
@@ -31,37 +31,9 @@ from .sheen import sheen_albedo
 F82 = f4(1 / 7)  # cosine of the angle where `specular_color` tints a metal, about 82°
 MICROMETERS = f4(1000)  # in nanometers
 LEAST_TINT = f4(1e-6)
-# names and defaults of the specification
-DEFAULTS: dict[str, Any] = {
-    "base_weight": 1.0,
-    "base_color": 0.8,
-    "base_diffuse_roughness": 0.0,
-    "base_metalness": 0.0,
-    "specular_weight": 1.0,
-    "specular_color": 1.0,
-    "specular_roughness": 0.3,
-    "specular_ior": 1.5,
-    "specular_roughness_anisotropy": 0.0,
-    "transmission_weight": 0.0,
-    "transmission_color": 1.0,
-    "subsurface_weight": 0.0,
-    "subsurface_color": 0.8,
-    "coat_weight": 0.0,
-    "coat_color": 1.0,
-    "coat_roughness": 0.0,
-    "coat_ior": 1.6,
-    "coat_darkening": 1.0,
-    "fuzz_weight": 0.0,
-    "fuzz_color": 1.0,
-    "fuzz_roughness": 0.5,
-    "thin_film_weight": 0.0,
-    "thin_film_thickness": 0.5,
-    "thin_film_ior": 1.4,
-    "geometry_thin_walled": False,
-    "multiscatter": True,
-}
 
 
+@parametrized
 class OpenPBRBsdf(JointBsdf):
     """The BSDF of `OpenPBR`, which describes the parameters.
 
@@ -77,43 +49,41 @@ class OpenPBRBsdf(JointBsdf):
     """
 
     dimensions = 3
-    _layers: Layers
 
-    base_weight = Parameter(scalar)
-    base_color = Parameter(color)
-    base_diffuse_roughness = Parameter(scalar)
-    base_metalness = Parameter(scalar)
-    specular_weight = Parameter(partial(scalar, holds=lambda x: 0 <= x < np.inf, limit="at least 0"))
-    specular_color = Parameter(color)
-    specular_roughness = Parameter(scalar)
-    specular_ior = Parameter(refractive_index)
-    specular_roughness_anisotropy = Parameter(scalar)
-    transmission_weight = Parameter(scalar)
-    transmission_color = Parameter(color)
-    subsurface_weight = Parameter(scalar)
-    subsurface_color = Parameter(color)
-    coat_weight = Parameter(scalar)
-    coat_color = Parameter(color)
-    coat_roughness = Parameter(scalar)
-    coat_ior = Parameter(partial(scalar, holds=lambda x: 1 <= x <= 1e6, limit="from 1 to 1e+06"))
-    coat_darkening = Parameter(scalar)
-    fuzz_weight = Parameter(scalar)
-    fuzz_color = Parameter(color)
-    fuzz_roughness = Parameter(scalar)
-    thin_film_weight = Parameter(scalar)
-    thin_film_thickness = Parameter(
-        partial(scalar, holds=lambda x: 0 <= x <= 100, limit="in [0, 100] micrometers")
+    base_weight: Parameter[Scalar] = Parameter(scalar, default=1.0, kw_only=True)
+    base_color: Parameter[Color] = Parameter(color, default=0.8, kw_only=True)
+    base_diffuse_roughness: Parameter[Scalar] = Parameter(scalar, default=0.0, kw_only=True)
+    base_metalness: Parameter[Scalar] = Parameter(scalar, default=0.0, kw_only=True)
+    specular_weight: Parameter[Scalar] = Parameter(
+        partial(scalar, holds=lambda x: 0 <= x < np.inf, limit="at least 0"), default=1.0, kw_only=True
     )
-    thin_film_ior = Parameter(refractive_index)
-    geometry_thin_walled = Parameter(lambda _, value: bool(value))
-    multiscatter = Parameter(lambda _, value: bool(value))
-
-    def __init__(self, **parameters: Any) -> None:
-        for name in parameters.keys() - DEFAULTS.keys():
-            raise TypeError(f"OpenPBRBsdf got an unexpected keyword argument {name!r}")
-        for name, default in DEFAULTS.items():
-            setattr(self, name, parameters.get(name, default))
-        self.derive()
+    specular_color: Parameter[Color] = Parameter(color, default=1.0, kw_only=True)
+    specular_roughness: Parameter[Scalar] = Parameter(scalar, default=0.3, kw_only=True)
+    specular_ior: Parameter[Scalar] = Parameter(refractive_index, default=1.5, kw_only=True)
+    specular_roughness_anisotropy: Parameter[Scalar] = Parameter(scalar, default=0.0, kw_only=True)
+    transmission_weight: Parameter[Scalar] = Parameter(scalar, default=0.0, kw_only=True)
+    transmission_color: Parameter[Color] = Parameter(color, default=1.0, kw_only=True)
+    subsurface_weight: Parameter[Scalar] = Parameter(scalar, default=0.0, kw_only=True)
+    subsurface_color: Parameter[Color] = Parameter(color, default=0.8, kw_only=True)
+    coat_weight: Parameter[Scalar] = Parameter(scalar, default=0.0, kw_only=True)
+    coat_color: Parameter[Color] = Parameter(color, default=1.0, kw_only=True)
+    coat_roughness: Parameter[Scalar] = Parameter(scalar, default=0.0, kw_only=True)
+    coat_ior: Parameter[Scalar] = Parameter(
+        partial(scalar, holds=lambda x: 1 <= x <= 1e6, limit="from 1 to 1e+06"), default=1.6, kw_only=True
+    )
+    coat_darkening: Parameter[Scalar] = Parameter(scalar, default=1.0, kw_only=True)
+    fuzz_weight: Parameter[Scalar] = Parameter(scalar, default=0.0, kw_only=True)
+    fuzz_color: Parameter[Color] = Parameter(color, default=1.0, kw_only=True)
+    fuzz_roughness: Parameter[Scalar] = Parameter(scalar, default=0.5, kw_only=True)
+    thin_film_weight: Parameter[Scalar] = Parameter(scalar, default=0.0, kw_only=True)
+    thin_film_thickness: Parameter[Scalar] = Parameter(
+        partial(scalar, holds=lambda x: 0 <= x <= 100, limit="in [0, 100] micrometers"),
+        default=0.5,
+        kw_only=True,
+    )
+    thin_film_ior: Parameter[Scalar] = Parameter(refractive_index, default=1.4, kw_only=True)
+    geometry_thin_walled: Parameter[bool] = Parameter(flag, default=False, kw_only=True)
+    multiscatter: Parameter[bool] = Parameter(flag, default=True, kw_only=True)
 
     @property
     def thin(self) -> bool:

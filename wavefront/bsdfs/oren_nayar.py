@@ -9,8 +9,7 @@ import numpy as np
 from ..arrays.elementary import arctan2
 from ..arrays.vec import INV_PI, Floats, dot, f4
 from ..core.errors import SceneError
-from ..core.parameter import Parameter, brief
-from ..core.suggestions import suggests_keywords
+from ..core.parameter import Parameter, brief, flag, parametrized
 from ..sampling.warp import cosine_hemisphere_pdf
 from ..textures.base import BaseTexture
 from ..textures.parameter import Color, Scalar, color, scalar
@@ -21,6 +20,7 @@ MEAN_SLOPE = f4(2 / 3 - 28 / (15 * np.pi))
 LEAST_LOSS = f4(1e-7)
 
 
+@parametrized
 class OrenNayar(Bsdf):
     """A rough diffuse surface, such as clay or plaster: it looks flatter than `Diffuse`.
 
@@ -50,17 +50,11 @@ class OrenNayar(Bsdf):
     >>> plaster = wf.OrenNayar(0.7, sigma=0.5)
     """
 
-    reflectance = Parameter(color)
-    sigma = Parameter(partial(scalar, holds=lambda x: 0 <= x <= np.pi / 2, limit="in [0, π/2]"))
-
-    @suggests_keywords
-    def __init__(
-        self, reflectance: Color = 0.5, sigma: Scalar = 0.5, *, energy_preserving: bool = False
-    ) -> None:
-        self.reflectance = reflectance
-        self.sigma = sigma
-        self.energy_preserving = energy_preserving
-        self.derive()
+    reflectance: Parameter[Color] = Parameter(color, default=0.5)
+    sigma: Parameter[Scalar] = Parameter(
+        partial(scalar, holds=lambda x: 0 <= x <= np.pi / 2, limit="in [0, π/2]"), default=0.5
+    )
+    energy_preserving: Parameter[bool] = Parameter(flag, default=False, kw_only=True)
 
     def derive(self) -> None:
         """Check what the model that preserves energy asks for."""

@@ -8,22 +8,22 @@ import numpy as np
 
 from ..arrays.vec import INV_PI, Doubles, Floats, dot, f4
 from ..core.errors import number
-from ..core.parameter import Parameter
-from ..core.suggestions import suggests_keywords
+from ..core.parameter import Parameter, flag, parametrized
 from ..sampling.warp import cosine_hemisphere, cosine_hemisphere_pdf
 from ..textures.base import BaseTexture
-from ..textures.parameter import MAX_INDEX, Color, Scalar, color
+from ..textures.parameter import MAX_INDEX, Color, Scalar, color, scalar
 from .base import BsdfSample, weigh
 from .fresnel import fresnel_dielectric
 from .microfacet import Facets, alpha_of, reflect, refract
 from .mirror import mirrored
-from .rough import Distribution, RoughBsdf, Shadowing
+from .rough import Distribution, Microfacets, Shadowing, distribution_of, shadowing_of
 
 COSINES = 64  # columns of a table: cosines in [0, 1]
 ROWS = 41  # rows of a table for textures: roughnesses in [0, 1]
 
 
-class Plastic(RoughBsdf):
+@parametrized
+class Plastic(Microfacets):
     """A plastic, by its physics: a smooth or rough clear boundary over a matte base.
 
     Light that gets through the boundary is scattered by the base, and part of it is reflected back to the
@@ -61,35 +61,21 @@ class Plastic(RoughBsdf):
 
     dimensions = 3
 
-    reflectance = Parameter(color)
-    ior = Parameter(
+    reflectance: Parameter[Color] = Parameter(color, default=0.5)
+    roughness: Parameter[Scalar] = Parameter(scalar, default=0.0)
+    ior: Parameter[float] = Parameter(
         partial(
             number,
             holds=lambda x: 1 / MAX_INDEX <= x <= MAX_INDEX,
             limit=f"more than 0, from {1 / MAX_INDEX:g} to {MAX_INDEX:g}",
-        )
+        ),
+        default=1.5,
     )
-    specular_reflectance = Parameter(color)
-
-    @suggests_keywords
-    def __init__(
-        self,
-        reflectance: Color = 0.5,
-        roughness: Scalar = 0.0,
-        ior: float = 1.5,
-        *,
-        specular_reflectance: Color = 1.0,
-        nonlinear: bool = False,
-        distribution: Distribution = "ggx",
-        shadowing: Shadowing = "correlated",
-        multiscatter: bool = True,
-    ) -> None:
-        self.reflectance = reflectance
-        self._set_facets(roughness, None, 0.0, distribution, shadowing, multiscatter)
-        self.ior = ior
-        self.specular_reflectance = specular_reflectance
-        self.nonlinear = nonlinear
-        self.derive()
+    specular_reflectance: Parameter[Color] = Parameter(color, default=1.0, kw_only=True)
+    nonlinear: Parameter[bool] = Parameter(flag, default=False, kw_only=True)
+    distribution: Parameter[Distribution] = Parameter(distribution_of, default="ggx", kw_only=True)
+    shadowing: Parameter[Shadowing] = Parameter(shadowing_of, default="correlated", kw_only=True)
+    multiscatter: Parameter[bool] = Parameter(flag, default=True, kw_only=True)
 
     def derive(self) -> None:
         """Set whether the boundary is smooth, and which table it has: one roughness, or None for all."""

@@ -10,8 +10,7 @@ import numpy as np
 
 from ..arrays.state import SurfaceInteraction
 from ..arrays.vec import INV_PI, TINY, Bools, Floats, broadcast, dot, f4, luminance
-from ..core.parameter import Parameter
-from ..core.suggestions import suggests_keywords
+from ..core.parameter import Parameter, flag, parametrized
 from ..sampling.warp import cosine_hemisphere, cosine_hemisphere_pdf
 from ..textures.base import BaseTexture
 from ..textures.parameter import Color, Scalar, color, refractive_index, scalar
@@ -21,7 +20,7 @@ from .dielectric import LEAST_BEND
 from .energy import Loss, Shape, gain, loss, mean_over_cosines, part_kept
 from .fresnel import fresnel_dielectric
 from .microfacet import Facets, alpha_of, reflect, refract
-from .rough import RoughBsdf
+from .rough import Microfacets, angle, roughness_across
 from .sheen import sheen_albedo, sheen_lobe
 from .thin_film import film_reflectance, has_film, thickness
 
@@ -38,7 +37,8 @@ class Chances(NamedTuple):
     diffuse: Floats  # cosine-weighted
 
 
-class Principled(RoughBsdf):
+@parametrized
+class Principled(Microfacets):
     """The principled material: metal, plastic, glass, cloth and varnish by a few intuitive parameters.
 
     With only `base_color`, `metallic` and `roughness` this is the metallic-roughness material of
@@ -98,62 +98,26 @@ class Principled(RoughBsdf):
     """
 
     dimensions = 3
-    back_facing: Bools | None = None  # (n,) wo is inside; unbound, it is outside
 
-    base_color = Parameter(color)
-    metallic = Parameter(scalar)
-    ior = Parameter(refractive_index)
-    transmission = Parameter(scalar)
-    clearcoat = Parameter(scalar)
-    clearcoat_roughness = Parameter(scalar)
-    sheen = Parameter(scalar)
-    sheen_color = Parameter(color)
-    sheen_roughness = Parameter(scalar)
-    specular_weight = Parameter(scalar, "specular")
-    specular_color = Parameter(partial(color, high=np.inf))
-    film_thickness = Parameter(thickness)
-    film_ior = Parameter(refractive_index)
-
-    @suggests_keywords
-    def __init__(
-        self,
-        base_color: Color = 0.8,
-        metallic: Scalar = 0.0,
-        roughness: Scalar = 0.5,
-        ior: Scalar = 1.5,
-        transmission: Scalar = 0.0,
-        *,
-        roughness_v: Scalar | None = None,
-        rotation: Scalar = 0.0,
-        thin: bool = False,
-        clearcoat: Scalar = 0.0,
-        clearcoat_roughness: Scalar = 0.03,
-        sheen: Scalar = 0.0,
-        sheen_color: Color = 1.0,
-        sheen_roughness: Scalar = 0.3,
-        specular: Scalar = 1.0,
-        specular_color: Color = 1.0,
-        film_thickness: Scalar = 0.0,
-        film_ior: Scalar = 1.3,
-        conserve_energy: bool = True,
-        multiscatter: bool = True,
-    ) -> None:
-        self.base_color = base_color
-        self.metallic = metallic
-        self._set_facets(roughness, roughness_v, rotation, "ggx", "correlated", multiscatter)
-        self.ior = ior
-        self.transmission = transmission
-        self.thin = thin
-        self.clearcoat = clearcoat
-        self.clearcoat_roughness = clearcoat_roughness
-        self.sheen = sheen
-        self.sheen_color = sheen_color
-        self.sheen_roughness = sheen_roughness
-        self.specular_weight = specular
-        self.specular_color = specular_color
-        self.film_thickness, self.film_ior = film_thickness, film_ior
-        self.conserve_energy = conserve_energy
-        self.derive()
+    base_color: Parameter[Color] = Parameter(color, default=0.8)
+    metallic: Parameter[Scalar] = Parameter(scalar, default=0.0)
+    roughness: Parameter[Scalar] = Parameter(scalar, default=0.5)
+    ior: Parameter[Scalar] = Parameter(refractive_index, default=1.5)
+    transmission: Parameter[Scalar] = Parameter(scalar, default=0.0)
+    roughness_v: Parameter[Scalar | None] = Parameter(roughness_across, default=None, kw_only=True)
+    rotation: Parameter[Scalar] = Parameter(angle, default=0.0, kw_only=True)
+    thin: Parameter[bool] = Parameter(flag, default=False, kw_only=True)
+    clearcoat: Parameter[Scalar] = Parameter(scalar, default=0.0, kw_only=True)
+    clearcoat_roughness: Parameter[Scalar] = Parameter(scalar, default=0.03, kw_only=True)
+    sheen: Parameter[Scalar] = Parameter(scalar, default=0.0, kw_only=True)
+    sheen_color: Parameter[Color] = Parameter(color, default=1.0, kw_only=True)
+    sheen_roughness: Parameter[Scalar] = Parameter(scalar, default=0.3, kw_only=True)
+    specular_weight: Parameter[Scalar] = Parameter(scalar, default=1.0, kw_only=True, alias="specular")
+    specular_color: Parameter[Color] = Parameter(partial(color, high=np.inf), default=1.0, kw_only=True)
+    film_thickness: Parameter[Scalar] = Parameter(thickness, default=0.0, kw_only=True)
+    film_ior: Parameter[Scalar] = Parameter(refractive_index, default=1.3, kw_only=True)
+    conserve_energy: Parameter[bool] = Parameter(flag, default=True, kw_only=True)
+    multiscatter: Parameter[bool] = Parameter(flag, default=True, kw_only=True)
 
     def derive(self) -> None:
         """Set which lobes exist."""

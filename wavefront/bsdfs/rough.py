@@ -11,7 +11,7 @@ from ..arrays.elementary import sin_cos_turns
 from ..arrays.state import SurfaceInteraction
 from ..arrays.vec import Floats, dot, f4
 from ..core.errors import one_of
-from ..core.parameter import Parameter
+from ..core.parameter import Parameter, flag, parametrized
 from ..textures.base import BaseTexture
 from ..textures.parameter import Scalar, scalar
 from .base import JointBsdf
@@ -20,6 +20,11 @@ from .microfacet import Facets, alpha_of, is_smooth
 
 Distribution: TypeAlias = Literal["ggx", "beckmann"]
 Shadowing: TypeAlias = Literal["correlated", "separable"]
+
+
+angle = partial(scalar, holds=np.isfinite, limit="finite")
+distribution_of = partial(one_of, choices=("ggx", "beckmann"))
+shadowing_of = partial(one_of, choices=("correlated", "separable"))
 
 
 def roughness_across(name: str, value: Scalar | None) -> Any:
@@ -52,32 +57,16 @@ class Tangent(BaseTexture):
         return np.stack([x * cos - y * sin, y * cos + x * sin])
 
 
-class RoughBsdf(JointBsdf):
-    """A BSDF whose surface consists of microfacets."""
+class Microfacets(JointBsdf):
+    """A BSDF whose surface consists of microfacets; a subclass declares which of these are parameters."""
 
-    roughness = Parameter(scalar)
-    roughness_v = Parameter(roughness_across)
-    rotation = Parameter(partial(scalar, holds=np.isfinite, limit="finite"))
-    distribution = Parameter(partial(one_of, choices=("ggx", "beckmann")))
-    shadowing = Parameter(partial(one_of, choices=("correlated", "separable")))
-    multiscatter = Parameter(lambda _, value: bool(value))
+    roughness: Any
+    roughness_v: Any = None
+    rotation: Any = np.zeros(1, f4)
+    distribution: Any = "ggx"
+    shadowing: Any = "correlated"
+    multiscatter: Any = False
     tangent: Any = None
-
-    def _set_facets(
-        self,
-        roughness: Scalar,
-        roughness_v: Scalar | None,
-        rotation: Scalar,
-        distribution: Distribution,
-        shadowing: Shadowing,
-        multiscatter: bool = False,
-    ) -> None:
-        self.multiscatter = multiscatter
-        self.roughness = roughness
-        self.roughness_v = roughness_v
-        self.rotation = rotation
-        self.distribution = distribution
-        self.shadowing = shadowing
 
     def derive(self) -> None:
         """Set `specular` from the roughness, and what tells its direction."""
@@ -104,3 +93,14 @@ class RoughBsdf(JointBsdf):
         tangent = None if isinstance(self.tangent, BaseTexture) else self.tangent
         beckmann, separable = self.distribution == "beckmann", self.shadowing == "separable"
         return Facets(alpha_of(self.roughness), across, tangent, beckmann, separable)
+
+
+@parametrized
+class RoughBsdf(Microfacets):
+    """A BSDF with all parameters of microfacets but `roughness`, whose place a subclass chooses."""
+
+    roughness_v: Parameter[Scalar | None] = Parameter(roughness_across, default=None, kw_only=True)
+    rotation: Parameter[Scalar] = Parameter(angle, default=0.0, kw_only=True)
+    distribution: Parameter[Distribution] = Parameter(distribution_of, default="ggx", kw_only=True)
+    shadowing: Parameter[Shadowing] = Parameter(shadowing_of, default="correlated", kw_only=True)
+    multiscatter: Parameter[bool] = Parameter(flag, default=True, kw_only=True)

@@ -10,8 +10,7 @@ import numpy as np
 from ..arrays.state import SurfaceInteraction
 from ..arrays.vec import Bools, Floats, f4
 from ..core.errors import SceneError
-from ..core.parameter import Parameter
-from ..core.suggestions import suggests_keywords
+from ..core.parameter import Parameter, parametrized
 from .base import Bsdf, BsdfSample, JointBsdf
 
 
@@ -23,6 +22,7 @@ def _opaque(name: str, value: Any) -> Bsdf | None:
     return value
 
 
+@parametrized
 class Sides(JointBsdf):
     """A surface with one BSDF on its front and another, or none, on its back.
 
@@ -47,15 +47,8 @@ class Sides(JointBsdf):
     """
 
     dimensions = 3
-    _behind: Bools | None = None  # (n,) wo is on the back; unbound, on the front
-
-    front = Parameter(_opaque)
-    back = Parameter(_opaque)
-
-    @suggests_keywords
-    def __init__(self, front: Bsdf, back: Bsdf | None = None) -> None:
-        self.front, self.back = front, back
-        self.derive()
+    front: Parameter[Bsdf] = Parameter(_opaque)
+    back: Parameter[Bsdf | None] = Parameter(_opaque, default=None)
 
     def derive(self) -> None:
         """Check that there is a front, and set the flags."""
@@ -67,7 +60,7 @@ class Sides(JointBsdf):
         """Look up the parameters of both BSDFs, and the side."""
         bound = copy(super().bind(surface))
         back = None if self.back is None else self.back.bind(surface)
-        vars(bound).update(front=self.front.bind(surface), back=back, _behind=surface.back_facing)
+        vars(bound).update(front=self.front.bind(surface), back=back, back_facing=surface.back_facing)
         return bound
 
     def albedo(self, wo: Floats) -> Floats:
@@ -93,4 +86,4 @@ class Sides(JointBsdf):
         return BsdfSample(*(np.where(behind, second, first) for first, second in pairs))
 
     def _back_of(self, wo: Floats) -> Bools:
-        return np.zeros(wo.shape[1], np.bool_) if self._behind is None else self._behind
+        return np.zeros(wo.shape[1], np.bool_) if self.back_facing is None else self.back_facing

@@ -2,16 +2,21 @@
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Callable
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, ClassVar, Generic, TypeVar, dataclass_transform
 
 import numpy as np
 
-MISSING = object()
+from .suggestions import suggests_keywords
+
+T = TypeVar("T")
+C = TypeVar("C", bound=type)
+MISSING: Any = object()
 MOST_SHOWN = 16  # numbers of an array
 
 
-class Parameter:
+class Parameter(Generic[T]):
     """An attribute that is converted and checked whenever it is assigned, in the constructor or later.
 
     The value is stored in the instance's own namespace, so reading it costs no more than any attribute.
@@ -21,24 +26,32 @@ class Parameter:
     convert
         Called with the name for messages, such as "Diffuse reflectance", and the value; returns the value
         to store, or raises a SceneError. It must also accept its own results.
-    argument
-        Name of the constructor's argument, if it differs from the attribute; for messages.
+    default, kw_only
+        Of the constructor's argument, where `parametrized` makes the constructor.
+    alias
+        Name of the argument, if it differs from the attribute.
     """
 
-    def __init__(self, convert: Callable[[str, Any], Any], argument: str | None = None) -> None:
-        self._convert, self._argument = convert, argument
+    def __init__(
+        self,
+        convert: Callable[[str, Any], Any],
+        *,
+        default: Any = MISSING,
+        kw_only: bool = False,
+        alias: str | None = None,
+    ) -> None:
+        self.convert, self.default, self.kw_only, self.alias = convert, default, kw_only, alias
         self._name = ""
 
     def __set_name__(self, owner: type, name: str) -> None:
-        """Record the name of the attribute."""
-        self._name = name
+        """Record the name of the attribute, and of the argument."""
+        self._name, self.alias = name, self.alias or name
 
-    def __set__(self, instance: Any, value: Any) -> None:
+    def __set__(self, instance: Any, value: T) -> None:
         """Store the converted value. After the constructor, recompute the values that follow from it."""
         values = vars(instance)
         known, before = self._name in values, values.get(self._name)
-        title = f"{type(instance).__name__} {self._argument or self._name}"
-        values[self._name] = self._convert(title, value)
+        values[self._name] = self.convert(f"{type(instance).__name__} {self.alias}", value)
         if known:
             try:
                 instance.derive()
@@ -51,8 +64,43 @@ class Parameter:
         def __get__(self, instance: Any, owner: type) -> Any: ...
 
 
+@dataclass_transform(eq_default=False, field_specifiers=(Parameter,))
+def parametrized(cls: C) -> C:
+    """Give a class the constructor that its annotated parameters declare, and those of its base classes.
+
+    As in a dataclass, the arguments are in the order of the declarations, keyword-only ones last. The
+    constructor assigns all of them, and then calls `derive`.
+    """
+    found: dict[str, tuple[Parameter[Any], str]] = {}
+    made: dict[str, Any] = {}
+    for base in reversed(cls.__mro__):
+        made.update(vars(sys.modules[base.__module__]))  # where the annotations have their names
+        for name, annotation in vars(base).get("__annotations__", {}).items():
+            if isinstance(value := vars(base).get(name), Parameter):
+                found[name] = value, annotation.removeprefix("Parameter[").removesuffix("]")
+    arguments = {False: ["self"], True: ["*"]}
+    for parameter, kind in found.values():
+        default = "" if parameter.default is MISSING else f" = default[{parameter.alias!r}]"
+        arguments[parameter.kw_only].append(f"{parameter.alias}: {kind}{default}")
+    known = [*arguments[False], *(arguments[True] if len(arguments[True]) > 1 else ())]
+    assigned = "".join(f"    self.{name} = {parameter.alias}\n" for name, (parameter, _) in found.items())
+    made["default"] = {parameter.alias: parameter.default for parameter, _ in found.values()}
+    exec(f"def __init__({', '.join(known)}) -> None:\n{assigned}    self.derive()", made)
+    init = made["__init__"]
+    init.__qualname__, init.__module__ = f"{cls.__qualname__}.__init__", cls.__module__
+    cls.defaults, cls.__init__ = made["default"], suggests_keywords(init)  # type: ignore[attr-defined, misc]
+    return cls
+
+
+def flag(name: str, value: Any) -> bool:
+    """Return whether a value is true."""
+    return bool(value)
+
+
 class Parametrized:
     """Base of classes with parameters; `repr` shows them."""
+
+    defaults: ClassVar[dict[str, Any]]  # of the constructor's arguments, where `parametrized` makes it
 
     def derive(self) -> None:
         """Compute the values that follow from several parameters. Constructors call it at the end."""

@@ -14,8 +14,7 @@ from ..arrays.state import SurfaceInteraction
 from ..arrays.vec import TWO_PI, Floats, column, dot, f4
 from ..colors import rgb
 from ..core.errors import SceneError, finite_array, number
-from ..core.parameter import Parameter, Parametrized
-from ..core.suggestions import suggests_keywords
+from ..core.parameter import Parameter, Parametrized, parametrized
 from ..film.aov_names import DEFAULT_GROUP, group_name
 from ..sampling.warp import uniform_cone
 from .base import DeltaLight, Emitters, Light, LightSample
@@ -112,6 +111,7 @@ def _angle(name: str, value: float) -> float:
     return number(name, value, lambda x: x == 0 or MIN_ANGLE <= x <= 180, allowed)
 
 
+@parametrized
 class DirectionalLight(Parametrized, Light):
     """A directional light, infinitely far away, such as the sun.
 
@@ -140,19 +140,10 @@ class DirectionalLight(Parametrized, Light):
     >>> sun = wf.DirectionalLight((-1, -2, -1), irradiance=3, angle=0.53)
     """
 
-    direction = Parameter(unit)
-    irradiance = Parameter(rgb)
-    angle = Parameter(_angle)
-    group = Parameter(group_name)
-
-    @suggests_keywords
-    def __init__(
-        self, direction: ArrayLike, irradiance: ArrayLike, *, angle: float = 0.0, group: str = DEFAULT_GROUP
-    ) -> None:
-        self.direction = direction
-        self.irradiance = irradiance
-        self.angle = angle
-        self.group = group
+    direction: Parameter[ArrayLike] = Parameter(unit)
+    irradiance: Parameter[ArrayLike] = Parameter(rgb)
+    angle: Parameter[float] = Parameter(_angle, default=0.0, kw_only=True)
+    group: Parameter[str] = Parameter(group_name, default=DEFAULT_GROUP, kw_only=True)
 
     def scaled(self, factor: float) -> Self:
         """Return the light: it has no length."""

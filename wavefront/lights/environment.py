@@ -110,7 +110,7 @@ class Environment(Parametrized, Light):
     >>> sky = wf.Environment(rows * np.ones((32, 64, 3)) * (0.4, 0.6, 1.0))
     """
 
-    group = Parameter(group_name)
+    group: Parameter[str] = Parameter(group_name)
 
     @suggests_keywords
     def __init__(

@@ -184,8 +184,8 @@ class IESLight(LightAtPoint):
     """
 
     hint = "direct the IESLight"
-    direction = Parameter(unit)
-    c0 = Parameter(unit)
+    direction: Parameter[ArrayLike] = Parameter(unit)
+    c0: Parameter[ArrayLike] = Parameter(unit)
 
     @suggests_keywords
     def __init__(

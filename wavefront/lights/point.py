@@ -12,8 +12,7 @@ from ..arrays.soa import soa
 from ..arrays.vec import FLOAT32_MAX, Floats, dot, f4
 from ..colors import rgb
 from ..core.errors import SceneError, as_array, finite_array
-from ..core.parameter import Parameter, Parametrized
-from ..core.suggestions import suggests_keywords
+from ..core.parameter import Parameter, Parametrized, parametrized
 from ..film.aov_names import DEFAULT_GROUP, group_name
 from .base import DeltaLight, Emitters, Light, LightSample, position
 
@@ -63,13 +62,14 @@ def intensity_of(name: str, value: ArrayLike) -> NDArray[np.float64]:
     return rgb(name, value, dtype=np.float64)
 
 
+@parametrized
 class LightAtPoint(Parametrized, Light):
     """Base of lights at one position, with an intensity."""
 
     delta = True
-    position = Parameter(position)
-    intensity = Parameter(intensity_of)
-    group = Parameter(group_name)
+    position: Parameter[ArrayLike] = Parameter(position)
+    intensity: Parameter[ArrayLike] = Parameter(intensity_of)
+    group: Parameter[str] = Parameter(group_name, default=DEFAULT_GROUP, kw_only=True)
 
     @property
     def bounds(self) -> NDArray[np.float64]:
@@ -112,12 +112,6 @@ class PointLight(LightAtPoint):
     >>> lamp = wf.PointLight((0, 3, 0), intensity=(40, 35, 30))
     """
 
-    @suggests_keywords
-    def __init__(self, position: ArrayLike, intensity: ArrayLike, *, group: str = DEFAULT_GROUP) -> None:
-        self.position = position
-        self.intensity = intensity
-        self.group = group
-
     def record(self, center: NDArray[np.float64]) -> PointLightRecord:
         """Return the light as a record of one column, relative to `center` (3,)."""
         return PointLightRecord((self.position - center).astype(f4).reshape(3, 1), self.intensity.astype(f4))
@@ -155,6 +149,7 @@ def intensities_of(name: str, value: ArrayLike) -> NDArray[np.float64]:
     return array
 
 
+@parametrized
 class PointLights(Parametrized, Light):
     """Many point lights as one object, given by arrays.
 
@@ -183,16 +178,9 @@ class PointLights(Parametrized, Light):
     """
 
     delta = True
-    positions = Parameter(checked_positions)
-    intensities = Parameter(intensities_of)
-    group = Parameter(group_name)
-
-    @suggests_keywords
-    def __init__(self, positions: ArrayLike, intensities: ArrayLike, *, group: str = DEFAULT_GROUP) -> None:
-        self.positions = positions
-        self.intensities = intensities
-        self.group = group
-        self.derive()
+    positions: Parameter[ArrayLike] = Parameter(checked_positions)
+    intensities: Parameter[ArrayLike] = Parameter(intensities_of)
+    group: Parameter[str] = Parameter(group_name, default=DEFAULT_GROUP, kw_only=True)
 
     def derive(self) -> None:
         """Check that there is an intensity for each position."""

@@ -55,10 +55,10 @@ class Projector(LightAtPoint):
     """
 
     hint = "direct the Projector, or widen its fov"
-    direction = Parameter(unit)
-    picture = Parameter(picture_of)
-    fov = Parameter(_fov)
-    up = Parameter(unit)
+    direction: Parameter[ArrayLike] = Parameter(unit)
+    picture: Parameter[Any] = Parameter(picture_of)
+    fov: Parameter[float] = Parameter(_fov)
+    up: Parameter[ArrayLike] = Parameter(unit)
 
     @suggests_keywords
     def __init__(

@@ -126,7 +126,7 @@ class Sky(Parametrized, Light):
     >>> scene = wf.Scene([wf.Sphere((0, 0, 0), 1)], [sky])
     """
 
-    group = Parameter(group_name)
+    group: Parameter[str] = Parameter(group_name)
 
     def __init__(
         self,

@@ -226,12 +226,12 @@ class SpotLight(LightAtPoint):
     """
 
     hint = "direct the SpotLight, or widen its cone"
-    direction = Parameter(unit)
-    angle = Parameter(_angle)
-    blend = Parameter(_blend)
-    falloff = Parameter(partial(one_of, choices=("smooth", "linear")))
-    picture = Parameter(picture_of)
-    up = Parameter(unit)
+    direction: Parameter[ArrayLike] = Parameter(unit)
+    angle: Parameter[float] = Parameter(_angle)
+    blend: Parameter[float] = Parameter(_blend)
+    falloff: Parameter[str] = Parameter(partial(one_of, choices=("smooth", "linear")))
+    picture: Parameter[Any] = Parameter(picture_of)
+    up: Parameter[ArrayLike] = Parameter(unit)
 
     @suggests_keywords
     def __init__(

@@ -11,7 +11,7 @@ from ..arrays.vec import f4
 from ..bsdfs import Bsdf
 from ..core.errors import SceneError, number
 from ..core.html import preview_html
-from ..core.parameter import Parameter, Parametrized
+from ..core.parameter import Parameter, Parametrized, parametrized
 from ..core.suggestions import suggests_keywords
 from ..film.aov_names import DEFAULT_GROUP, group_name
 from ..media import BaseMedium
@@ -65,6 +65,7 @@ def _name(name: str, value: Any) -> str | None:
     return value
 
 
+@parametrized
 class Material(Parametrized):
     """A BSDF, and everything else that a surface is made of.
 
@@ -113,41 +114,15 @@ class Material(Parametrized):
     >>> green_glass = wf.Material(wf.Dielectric(1.5), interior=wf.Medium(absorption=(2, 0.2, 1)))
     """
 
-    bsdf = Parameter(_bsdf)
-    alpha = Parameter(_alpha)
-    alpha_cutoff = Parameter(_cutoff)
-    normal_map = Parameter(_normal_map)
-    emission = Parameter(_emission)
-    interior = Parameter(_interior)
-    priority = Parameter(_priority)
-    group = Parameter(group_name)
-    name = Parameter(_name)
-    opacity: Opacity | None
-
-    @suggests_keywords
-    def __init__(
-        self,
-        bsdf: Bsdf,
-        *,
-        alpha: Scalar | None = None,
-        alpha_cutoff: float | None = None,
-        normal_map: BaseNormalMap | None = None,
-        emission: Color | None = None,
-        interior: BaseMedium | None = None,
-        priority: int | None = None,
-        group: str = DEFAULT_GROUP,
-        name: str | None = None,
-    ) -> None:
-        self.bsdf = bsdf
-        self.alpha = alpha
-        self.alpha_cutoff = alpha_cutoff
-        self.normal_map = normal_map
-        self.emission = emission
-        self.interior = interior
-        self.priority = priority
-        self.group = group
-        self.name = name
-        self.derive()
+    bsdf: Parameter[Bsdf] = Parameter(_bsdf)
+    alpha: Parameter[Scalar | None] = Parameter(_alpha, default=None, kw_only=True)
+    alpha_cutoff: Parameter[float | None] = Parameter(_cutoff, default=None, kw_only=True)
+    normal_map: Parameter[BaseNormalMap | None] = Parameter(_normal_map, default=None, kw_only=True)
+    emission: Parameter[Color | None] = Parameter(_emission, default=None, kw_only=True)
+    interior: Parameter[BaseMedium | None] = Parameter(_interior, default=None, kw_only=True)
+    priority: Parameter[int | None] = Parameter(_priority, default=None, kw_only=True)
+    group: Parameter[str] = Parameter(group_name, default=DEFAULT_GROUP, kw_only=True)
+    name: Parameter[str | None] = Parameter(_name, default=None, kw_only=True)
 
     @classmethod
     @suggests_keywords
@@ -184,7 +159,7 @@ class Material(Parametrized):
         """Set the opacity."""
         alpha = np.zeros(1, f4) if self.bsdf.invisible else self.alpha
         opacity = None if alpha is None else Opacity(alpha, self.alpha_cutoff)
-        self.opacity = None if opacity is None or opacity.constant == 1 else opacity
+        self.opacity: Opacity | None = None if opacity is None or opacity.constant == 1 else opacity
 
     @property
     def encloses(self) -> bool:

@@ -8,7 +8,7 @@ from numpy.typing import ArrayLike
 from ..arrays.elementary import log
 from ..arrays.state import SurfaceInteraction
 from ..arrays.vec import Floats, f4
-from ..bsdfs.openpbr import DEFAULTS, OpenPBRBsdf
+from ..bsdfs.openpbr import OpenPBRBsdf
 from ..colors import rgb
 from ..core.errors import SceneError, number, warn_caller
 from ..core.suggestions import suggests_keywords
@@ -126,7 +126,7 @@ class OpenPBR(Material):
         if isinstance(subsurface_weight, BaseTexture) or subsurface_weight > 0:
             warn_caller("OpenPBR: subsurface scattering is approximated by a diffuse surface of its color")
         super().__init__(
-            OpenPBRBsdf(**{key: given[key] for key in DEFAULTS if key in given}),
+            OpenPBRBsdf(**{key: given[key] for key in OpenPBRBsdf.defaults if key in given}),
             alpha=geometry_opacity
             if isinstance(geometry_opacity, BaseTexture) or geometry_opacity != 1
             else None,

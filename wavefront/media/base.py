@@ -41,7 +41,11 @@ class BaseMedium(Parametrized, ABC):
     """What fills the space inside shapes, or around them: absorbs, scatters and emits light."""
 
     phase: PhaseFunction
-    sigma_a: Floats  # (3, 1) absorption per scene unit; for a grid where its density is 1
+    # (3, 1) absorption, scattering and emission per scene unit, times the scale; of a grid where its density
+    # is 1, without a grid of albedos
+    sigma_a: Floats
+    sigma_s: Floats
+    glow: Floats
     scatters: bool  # anywhere, in any channel
     glows: bool  # likewise for emission
 

@@ -13,13 +13,12 @@ from ..arrays.soa import soa
 from ..arrays.vec import FLOAT32_MAX, TINY, Doubles, Floats, Ints, dot, f4, highest, take
 from ..colors.spectrum import blackbody_colors
 from ..core.errors import SceneError, as_array, finite_array, number
-from ..core.parameter import Parameter
-from ..core.suggestions import suggests_keywords
+from ..core.parameter import Parameter, parametrized
 from ..sampling.steps import StepNumbers
 from .base import BaseMedium, Flight, MediumRecord, channel_shares
 from .marching import March, optical_depth
 from .medium import _albedo, _coefficient, _scale
-from .phase import Isotropic, PhaseFunction, as_phase
+from .phase import PhaseFunction, phase_or_isotropic
 from .voxels import Voxels, bounds_in_cells
 
 MOST_CELLS = 64  # of majorants along an axis
@@ -81,6 +80,7 @@ def _cells(name: str, value: Any) -> int:
     return int(number(name, value, lambda x: x == int(x) and 1 <= x <= MOST_CELLS, limit))
 
 
+@parametrized
 class GridMedium(BaseMedium):
     """A medium whose density varies over a grid, such as a cloud, smoke or fire.
 
@@ -125,41 +125,18 @@ class GridMedium(BaseMedium):
     >>> scene = wf.Scene([wf.GridBox(puff)], wf.DirectionalLight((-1, -2, -1), 3))
     """
 
-    density = Parameter(_colors_or(_grid))
-    transform = Parameter(_transform)
-    absorption = Parameter(_coefficient)
-    scattering = Parameter(_coefficient)
-    albedo = Parameter(_colors_or(_albedo, 1.0))
-    phase = Parameter(as_phase)
-    scale = Parameter(_scale)
-    emission = Parameter(_colors_or(_optional(_coefficient)))
-    temperature = Parameter(_optional(_grid))
-    majorant_cells = Parameter(_optional(_cells))
-    sigma_a: Floats  # (3, 1) absorption where the density is 1, times the scale; without a grid of albedos
-    sigma_s: Floats  # (3, 1) scattering, times the part in the grid of albedos
-    glow: Floats  # (3, 1) emission where the density is 1
-    glow_grid: Floats | None  # (z, y, x, 3) emission beside it
-
-    @suggests_keywords
-    def __init__(
-        self,
-        density: ArrayLike,
-        transform: ArrayLike = ((0, 0, 0), (1, 1, 1)),
-        absorption: ArrayLike = 0.0,
-        scattering: ArrayLike = 0.0,
-        *,
-        albedo: ArrayLike | None = None,
-        phase: PhaseFunction | None = None,
-        scale: float = 1.0,
-        emission: ArrayLike | None = None,
-        temperature: ArrayLike | None = None,
-        majorant_cells: int | None = None,
-    ) -> None:
-        self.density, self.transform = density, transform
-        self.absorption, self.scattering, self.albedo = absorption, scattering, albedo
-        self.phase, self.scale = Isotropic() if phase is None else phase, scale
-        self.emission, self.temperature, self.majorant_cells = emission, temperature, majorant_cells
-        self.derive()
+    density: Parameter[ArrayLike] = Parameter(_colors_or(_grid))
+    transform: Parameter[ArrayLike] = Parameter(_transform, default=((0, 0, 0), (1, 1, 1)))
+    absorption: Parameter[ArrayLike] = Parameter(_coefficient, default=0.0)
+    scattering: Parameter[ArrayLike] = Parameter(_coefficient, default=0.0)
+    albedo: Parameter[ArrayLike | None] = Parameter(_colors_or(_albedo, 1.0), default=None, kw_only=True)
+    phase: Parameter[PhaseFunction | None] = Parameter(phase_or_isotropic, default=None, kw_only=True)
+    scale: Parameter[float] = Parameter(_scale, default=1.0, kw_only=True)
+    emission: Parameter[ArrayLike | None] = Parameter(
+        _colors_or(_optional(_coefficient)), default=None, kw_only=True
+    )
+    temperature: Parameter[ArrayLike | None] = Parameter(_optional(_grid), default=None, kw_only=True)
+    majorant_cells: Parameter[int | None] = Parameter(_optional(_cells), default=None, kw_only=True)
 
     def derive(self) -> None:
         """Set the coefficients that are rendered."""
@@ -180,7 +157,8 @@ class GridMedium(BaseMedium):
         self.sigma_a, self.sigma_s, self.glow = (
             np.minimum(each * self.scale, most).astype(f4) for each in (absorbed, scattered, glow)
         )
-        self.glow_grid = grid if grid is not None and grid.any() else None
+        # (z, y, x, 3) emission beside `glow`
+        self.glow_grid: Floats | None = grid if grid is not None and grid.any() else None
         dense = bool(self.density.any())
         self.scatters = dense and bool(self.sigma_s.any())
         self.glows = (dense and bool(self.glow.any())) or self.glow_grid is not None

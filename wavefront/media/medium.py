@@ -13,12 +13,11 @@ from ..arrays.soa import soa
 from ..arrays.vec import FLOAT32_MAX, Floats, Ints, f4, highest, take
 from ..colors import rgb
 from ..core.errors import SceneError, number
-from ..core.parameter import Parameter
-from ..core.suggestions import suggests_keywords
+from ..core.parameter import Parameter, parametrized
 from ..sampling.steps import StepNumbers
 from ..textures.base import BaseTexture
 from .base import BaseMedium, Flight, MediumRecord, channel_shares, chosen_channel
-from .phase import Isotropic, PhaseFunction, as_phase
+from .phase import PhaseFunction, phase_or_isotropic
 
 THIN = f4(0.05)  # optical depth below which 1 − exp(−x) is a series
 
@@ -50,6 +49,7 @@ def _scale(name: str, value: Any) -> float:
     return number(name, value, lambda x: 0 <= x < np.inf, "at least 0 and finite")
 
 
+@parametrized
 class Medium(BaseMedium):
     """A homogeneous medium, such as colored glass, fog or milk.
 
@@ -85,33 +85,13 @@ class Medium(BaseMedium):
     >>> milk = wf.Medium(albedo=(0.999, 0.998, 0.99), mean_free_path=0.02)
     """
 
-    absorption = Parameter(_coefficient)
-    scattering = Parameter(_coefficient)
-    phase = Parameter(as_phase)
-    scale = Parameter(_scale)
-    emission = Parameter(_coefficient)
-    albedo = Parameter(_albedo)
-    mean_free_path = Parameter(_length)
-    sigma_a: Floats  # (3, 1) absorption, times the scale
-    sigma_s: Floats  # (3, 1) scattering
-    glow: Floats  # (3, 1) emission
-
-    @suggests_keywords
-    def __init__(
-        self,
-        absorption: ArrayLike = 0.0,
-        scattering: ArrayLike = 0.0,
-        *,
-        phase: PhaseFunction | None = None,
-        scale: float = 1.0,
-        emission: ArrayLike = 0.0,
-        albedo: ArrayLike | None = None,
-        mean_free_path: ArrayLike | None = None,
-    ) -> None:
-        self.absorption, self.scattering = absorption, scattering
-        self.phase, self.scale, self.emission = Isotropic() if phase is None else phase, scale, emission
-        self.albedo, self.mean_free_path = albedo, mean_free_path
-        self.derive()
+    absorption: Parameter[ArrayLike] = Parameter(_coefficient, default=0.0)
+    scattering: Parameter[ArrayLike] = Parameter(_coefficient, default=0.0)
+    phase: Parameter[PhaseFunction | None] = Parameter(phase_or_isotropic, default=None, kw_only=True)
+    scale: Parameter[float] = Parameter(_scale, default=1.0, kw_only=True)
+    emission: Parameter[ArrayLike] = Parameter(_coefficient, default=0.0, kw_only=True)
+    albedo: Parameter[ArrayLike | None] = Parameter(_albedo, default=None, kw_only=True)
+    mean_free_path: Parameter[ArrayLike | None] = Parameter(_length, default=None, kw_only=True)
 
     def derive(self) -> None:
         """Set the coefficients that are rendered."""

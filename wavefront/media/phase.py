@@ -10,8 +10,7 @@ import numpy as np
 from ..arrays.elementary import exp, log, sin_cos_turns
 from ..arrays.vec import INV_FOUR_PI, TINY, Floats, f4
 from ..core.errors import SceneError, number
-from ..core.parameter import Parameter, Parametrized
-from ..core.suggestions import suggests_keywords
+from ..core.parameter import Parameter, Parametrized, parametrized
 
 MOST_FORWARD = 0.99  # largest |g|: float32 resolves lobes up to there
 LARGEST_BELOW_ONE = 1 - 2.0**-24
@@ -73,6 +72,7 @@ def _mean_cosine(name: str, value: Any) -> float:
     return number(name, value, lambda x: -MOST_FORWARD <= x <= MOST_FORWARD, limit)
 
 
+@parametrized
 class HenyeyGreenstein(PhaseFunction):
     """The phase function of Henyey and Greenstein: a lobe of any width, forward or backward.
 
@@ -96,11 +96,7 @@ class HenyeyGreenstein(PhaseFunction):
     >>> fog = wf.Medium(scattering=0.1, phase=wf.HenyeyGreenstein(0.8))
     """
 
-    g = Parameter(_mean_cosine)
-
-    @suggests_keywords
-    def __init__(self, g: float = 0.0) -> None:
-        self.g = g
+    g: Parameter[float] = Parameter(_mean_cosine, default=0.0)
 
     @property
     def mean_cosine(self) -> float:
@@ -154,10 +150,16 @@ def as_phase(name: str, value: Any) -> PhaseFunction:
     return value
 
 
+def phase_or_isotropic(name: str, value: Any) -> PhaseFunction:
+    """Return a phase function; None is `Isotropic()`."""
+    return Isotropic() if value is None else as_phase(name, value)
+
+
 def _share(name: str, value: Any) -> float:
     return number(name, value, lambda x: 0 <= x <= 1, "in [0, 1]")
 
 
+@parametrized
 class PhaseMix(PhaseFunction):
     """A weighted mean of two phase functions, such as a forward and a backward lobe.
 
@@ -180,13 +182,9 @@ class PhaseMix(PhaseFunction):
     0.62
     """
 
-    first = Parameter(as_phase)
-    second = Parameter(as_phase)
-    weight = Parameter(_share)
-
-    @suggests_keywords
-    def __init__(self, first: PhaseFunction, second: PhaseFunction, weight: float = 0.5) -> None:
-        self.first, self.second, self.weight = first, second, weight
+    first: Parameter[PhaseFunction] = Parameter(as_phase)
+    second: Parameter[PhaseFunction] = Parameter(as_phase)
+    weight: Parameter[float] = Parameter(_share, default=0.5)
 
     @property
     def mean_cosine(self) -> float:
