@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+import significance
 from scenes import probe
 from significance import Mean, assert_mean, assert_same_images, measure, render, repeat
 
@@ -353,11 +354,14 @@ def test_a_coat_of_the_index_around_it_is_not_seen() -> None:
     assert wf.OpenPBR(priority=2).priority == 2
 
 
-def test_more_than_four_shapes_around_a_path() -> None:
+@pytest.mark.parametrize("executor", ["threads", "processes"])
+def test_more_than_four_shapes_around_a_path(executor: str) -> None:
+    """The warning comes once, and in the caller, whatever the number of jobs."""
     shells = [ball(wf.Medium(0.1, emission=1e-9), radius) for radius in (1.0, 1.5, 2.0, 2.5, 3.0)]
     scene = wf.Scene(shells, wf.Environment(1), probe((0, 0, 0), (0, 0, 5)))
-    with pytest.warns(UserWarning, match="inside of more than 4 shapes"):
-        render(scene, 1)
+    with pytest.warns(UserWarning, match="inside of more than 4 shapes") as caught:
+        render(scene, 64, executor=executor, workers=2, wave_size=256)
+    assert [each.filename for each in caught] == [significance.__file__]
 
 
 # --- The rest --------------------------------------------------------------------------------------------

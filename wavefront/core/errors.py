@@ -6,7 +6,8 @@ import os
 import sys
 import warnings
 from collections.abc import Callable, Collection, Iterable, Iterator
-from contextlib import suppress
+from contextlib import contextmanager, suppress
+from contextvars import ContextVar
 from typing import Any
 
 import numpy as np
@@ -17,6 +18,7 @@ from .suggestions import did_you_mean
 
 PACKAGE = os.path.join(os.path.dirname(os.path.dirname(__file__)), "")
 MOST_LETTERS = 120  # of a value in a message
+_collected: ContextVar[dict[str, None] | None] = ContextVar("collected", default=None)
 BEGIN, END = 1500, 500  # letters at both ends of a message that is kept where it is longer
 
 
@@ -140,11 +142,26 @@ def warn_caller(message: str) -> None:
 
     A warning that cannot be shown, as standard error is closed, is lost.
     """
+    collected = _collected.get()
+    if collected is not None:
+        collected[message] = None
+        return
     frame, level = sys._getframe(1), 2
     while frame.f_back is not None and frame.f_code.co_filename.startswith(PACKAGE):
         frame, level = frame.f_back, level + 1
     with suppress(OSError, ValueError, AttributeError):
         warnings.warn(plain(message), stacklevel=level)
+
+
+@contextmanager
+def collect_warnings() -> Iterator[dict[str, None]]:
+    """Collect what `warn_caller` is given in this thread, each message once, in place of warnings."""
+    messages: dict[str, None] = {}
+    token = _collected.set(messages)
+    try:
+        yield messages
+    finally:
+        _collected.reset(token)
 
 
 def in_brief(value: Any) -> str:

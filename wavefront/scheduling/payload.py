@@ -26,6 +26,7 @@ from ..core.shared import SharedInt, Stopped
 from .blas import single_threaded_blas
 from .heap import prepare_heap
 from .machine import machine_differences
+from .workers import with_warnings
 
 KEEP = 10.0  # seconds from the last job until a process forgets the work
 
@@ -45,6 +46,7 @@ class Reply:
     """What a worker answers to a job."""
 
     result: Any = None
+    warnings: tuple[str, ...] = ()
     differences: tuple[str, ...] = ()  # between the worker's machine and that of the render
     missing: bool = False  # the worker cannot read the work
     error: Exception | None = None  # Stopped or MemoryError, to be raised again
@@ -65,7 +67,7 @@ def do_job(payload: Payload, job: Any) -> Reply:
 def _reply(work: Callable[[Any], Any], job: Any, differing: tuple[str, ...]) -> Reply:
     single_threaded_blas.acquire()
     try:
-        return Reply(work(job), differing)
+        return Reply(*with_warnings(work, job), differing)
     except (Stopped, MemoryError) as error:
         return Reply(error=error)
     except KeyboardInterrupt:  # a terminal sends Ctrl-C to all processes; the render's own handles it

@@ -14,7 +14,7 @@ from typing import Any, Protocol
 from ..core.errors import RenderError, warn_caller
 from .machine import describe_machine
 from .payload import Payload, Reply, do_job, pack
-from .workers import JobFailed, StoppableWork, TaskPool, submit_to
+from .workers import JobFailed, StoppableWork, TaskPool, WarningsOfJobs, submit_to
 
 
 class Delivery(Protocol):
@@ -71,6 +71,7 @@ class RemoteWorkers:
         self.replaceable = pool.replaceable
         self._pool, self._strict, self._stop = pool, strict, work.stop
         self._warned: set[tuple[str, ...]] = set()
+        self._warnings = WarningsOfJobs()
         self._folder = tempfile.mkdtemp(prefix="wavefront-")
         try:
             data = pack(work, self._folder)
@@ -111,6 +112,7 @@ class RemoteWorkers:
             failure = JobFailed(reply.failure.strip().rpartition("\n")[2])
             failure.add_note(reply.failure)
             raise failure
+        self._warnings.repeat(reply.warnings)
         return reply.result
 
     def shutdown(self, running: Collection[Future[Any]]) -> None:

@@ -6,11 +6,12 @@ import math
 import os
 import platform
 import time
-from collections.abc import Callable, Collection
+from collections.abc import Callable, Collection, Iterable
 from concurrent.futures import BrokenExecutor, Executor, Future, ProcessPoolExecutor, ThreadPoolExecutor
 from concurrent.futures import wait as wait_for_futures
 from typing import Any, Protocol, TypeAlias
 
+from ..core.errors import collect_warnings, warn_caller
 from ..core.shared import AT_ONCE, SharedInt, Stopped
 
 POLL_INTERVAL = 0.02  # seconds between two checks whether workers have ended
@@ -77,20 +78,42 @@ WorkersMaker: TypeAlias = Callable[[StoppableWork, int, bool], Workers]  # with 
 ExecutorMaker: TypeAlias = Callable[[int], Executor]  # called with the number of workers
 
 
+class WarningsOfJobs:
+    """Repeats the warnings of jobs in the caller, each once."""
+
+    def __init__(self) -> None:
+        self._said: set[str] = set()
+
+    def repeat(self, messages: Iterable[str]) -> None:
+        """Warn of what has not been said yet."""
+        for message in messages:
+            if message not in self._said:
+                self._said.add(message)
+                warn_caller(message)
+
+
+def with_warnings(work: Callable[[Any], Any], job: Any) -> tuple[Any, tuple[str, ...]]:
+    """Do a job; return its result and its warnings."""
+    with collect_warnings() as messages:
+        return work(job), tuple(messages)
+
+
 class LocalWorkers:
     """Workers that share the memory of this process, so that they need not be sent anything but jobs."""
 
     def __init__(self, pool: TaskPool, work: Callable[[Any], Any]) -> None:
         self.replaceable = pool.replaceable
-        self._pool, self._work = pool, work
+        self._pool, self._work, self._warnings = pool, work, WarningsOfJobs()
 
     def submit(self, job: Any, attempt: int = 0) -> Future[Any]:
         """Give a job to the first worker that is free."""
-        return submit_to(self._pool, self._work, job)
+        return submit_to(self._pool, with_warnings, self._work, job)
 
     def result(self, future: Future[Any]) -> Any:
         """Return the result of a job that is done; an error is raised as it is."""
-        return future.result()
+        result, messages = future.result()
+        self._warnings.repeat(messages)
+        return result
 
     def shutdown(self, running: Collection[Future[Any]]) -> None:
         """End the workers if they are ours."""
