@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 from numpy.typing import ArrayLike
 
@@ -9,8 +11,10 @@ from ..arrays.vec import Doubles
 from ..core.errors import SceneError, finite_array
 from ..materials import MaterialLike, as_material
 from ..shapes import Mesh
-from ..shapes.transform import moved, moved_tangents
+from .placing import moved_raw
 from .repair import RawMesh, build
+
+COLUMNS = ("vertices", "normals", "uvs", "uvs1", "tangents", "colors")
 
 
 def join(
@@ -37,14 +41,7 @@ def join(
     if any(mesh.normals is not None for mesh in meshes):
         for each in meshes:
             each.keep_facets()
-    starts = np.cumsum([0] + [len(mesh.vertices) for mesh in meshes])
-    vertices = np.concatenate([mesh.vertices for mesh in meshes])
-    faces = np.concatenate([mesh.faces + start for mesh, start in zip(meshes, starts[:-1], strict=True)])
-    raw = RawMesh(name, *moved(matrix, vertices, faces, _joined([mesh.normals for mesh in meshes])))
-    raw.uvs = _joined([mesh.uvs for mesh in meshes])
-    raw.uvs1 = _joined([mesh.uvs1 for mesh in meshes])
-    raw.tangents = moved_tangents(matrix, _joined([mesh.tangents for mesh in meshes]))
-    raw.colors = _joined([mesh.colors for mesh in meshes])
+    raw = moved_raw(stacked(name, meshes), matrix)
     raw.material = meshes[0].material if material is None else as_material("material", material)
     if material is None:
         glow = meshes[0].emission
@@ -54,6 +51,14 @@ def join(
     if mesh is None:
         raise SceneError(f"{name}: transform leaves no face with an area")
     return mesh
+
+
+def stacked(name: str, parts: Sequence[Mesh | RawMesh]) -> RawMesh:
+    """Return one mesh with the triangles of all, and what all of them have per vertex."""
+    starts = np.cumsum([0] + [len(part.vertices) for part in parts])
+    faces = np.concatenate([part.faces + start for part, start in zip(parts, starts[:-1], strict=True)])
+    columns = {each: _joined([getattr(part, each) for part in parts]) for each in COLUMNS}
+    return RawMesh(name, faces=faces, **columns)  # type: ignore[arg-type]
 
 
 def _joined(parts: list[Doubles | None]) -> Doubles | None:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from copy import copy
 from typing import Any
 
 import numpy as np
@@ -16,7 +15,6 @@ from ...bsdfs import (
     Dielectric,
     Diffuse,
     Disney,
-    Measured,
     Mirror,
     Mix,
     Plastic,
@@ -98,20 +96,16 @@ def _two_sided(node: Node, job: Job) -> Material:
     behind = _inner(back[0], job)
     if (behind.alpha, behind.normal_map) != (None, None):
         node.lose("the mask or the normal map of its back")
-    material = copy(material)
-    material.bsdf = Sides(material.bsdf, behind.bsdf)
-    return material
+    return job.changed(material, bsdf=Sides(material.bsdf, behind.bsdf))
 
 
 @plugin("mask", "bsdf", "opacity", holds="bsdf texture")
 def _mask(node: Node, job: Job) -> Material:
-    material = copy(_inner(job.only(node, "bsdf"), job))
+    material = _inner(job.only(node, "bsdf"), job)
     if material.alpha is not None:
         node.lose("opacity, as there is another mask in it")
         return material
-    material.alpha = scalar(node, "opacity", 0.5, job)
-    material.derive()
-    return material
+    return job.changed(material, alpha=scalar(node, "opacity", 0.5, job))
 
 
 @plugin("null", "bsdf")
@@ -144,11 +138,7 @@ def _normal(node: Node, job: Job) -> Material:
 
 @plugin("measured", "bsdf", "filename", note="spectra become RGB under D65")
 def _measured(node: Node, job: Job) -> Material:
-    path = job.find(node.text("filename"))
-    key = ("measured", path)
-    if key not in job.made:
-        job.made[key] = Measured.from_bytes(str(path), job.files.read(path))
-    return _named(node, job.made[key])
+    return _named(node, job.measured(node))
 
 
 unsupported("circular hair measured_polarized polarizer pplastic retarder", "bsdf")
@@ -161,7 +151,7 @@ def _inner(node: Node, job: Job) -> Material:
 
 def _mapped(node: Node, job: Job, make: Any, channel: Any) -> Material:
     """Return the material in a plugin, with a map of its normals."""
-    material = copy(_inner(job.only(node, "bsdf"), job))
+    material = _inner(job.only(node, "bsdf"), job)
     image = job.only(node, "texture")
     if material.normal_map is not None:
         node.lose("the map, as there is another in its bsdf")
@@ -181,9 +171,7 @@ def _mapped(node: Node, job: Job, make: Any, channel: Any) -> Material:
     normal_map.mirrors_hidden = node.flag("flip_invalid_normals", True)
     if not normal_map.mirrors_hidden:
         node.lose("flip_invalid_normals")
-    material.normal_map = normal_map
-    material.derive()
-    return material
+    return job.changed(material, normal_map=normal_map)
 
 
 def _ior(node: Node, name: str, default: str) -> float:

@@ -16,12 +16,12 @@ import numpy as np
 
 from ...core.errors import SceneError, one_of
 from ...core.suggestions import did_you_mean
+from ..conversion import check_included, placed
 from ..sources import SceneFiles
 from ..text_lines import numbers
 from ..xml_checks import MAX_DEPTH, look_through
 from .transforms import OPERATIONS, product, vector
 
-MOST_INCLUDED = 15  # files inside each other
 _OBJECTS = (
     "scene shape bsdf emitter sensor film rfilter sampler integrator texture medium phase volume spectrum"
 )
@@ -192,18 +192,11 @@ class Document:
     def _include(self, parent: Element, given: dict[str, str], tag: Tag, path: Path, depth: int) -> None:
         """Add the content of another file."""
         self._included += 1
-        most = self._files.limits.includes
-        if self._included > most:
-            raise SceneError(
-                f"{tag.place}: includes more than {most} files; the limit is LoadLimits.includes"
-            )
-        if depth == MOST_INCLUDED:
-            raise SceneError(f"{tag.place}: files include each other; the limit is {MOST_INCLUDED} levels")
+        check_included(tag.place, self._files, self._included, depth)
         self.folders.append(path.parent)
         try:
-            file = self.find(given["filename"])
-        except SceneError as error:
-            raise SceneError(f"{tag.place}: {error}") from error
+            with placed(tag.place):
+                file = self.find(given["filename"])
         finally:
             self.folders.pop()
         included = self._read(file, self._files.read(file), depth + 1)

@@ -3,22 +3,18 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
-from pathlib import Path
+from dataclasses import dataclass
 from typing import Any, TypeVar
 
 import numpy as np
 
-from ...bsdfs import Diffuse
-from ...core.errors import SceneError, finite_array, in_brief, number, one_of
+from ...arrays.vec import Doubles
+from ...core.errors import SceneError, finite_array, in_brief, one_of
 from ...core.suggestions import did_you_mean
-from ...materials import Material
-from ...media import Isotropic
 from ...shapes.transform import Matrix
+from ..conversion import Conversion, Part
 from ..losses import Losses
 from ..placing import in_range
-from ..repair import RawMesh
-from ..sources import SceneFiles
 from ..xml_checks import MAX_DEPTH
 
 MOST_PARTS = 4096  # plugins that a plugin is made of, each counted as often as it is referred to
@@ -37,15 +33,6 @@ class Plugin:
 
 
 PLUGINS: dict[str, Plugin] = {}
-# what stands for a plugin that is not supported, and what the warning says of it
-INSTEAD: dict[str, tuple[Any, str]] = {
-    "bsdf": (Material(Diffuse(0.5)), "a gray Diffuse in its place"),
-    "texture": (0.5, "0.5 in its place"),
-    "rfilter": ({}, "the default in its place"),
-    "integrator": ({}, "path tracing in its place"),
-    "shape": ((), "left out"),
-    "phase": (Isotropic(), "isotropic in its place"),
-}
 COMMON = {  # parameters of all plugins of a kind that do not change the picture
     "emitter": ("sampling_weight",),
     "shape": ("silhouette_sampling_weight",),
@@ -75,7 +62,7 @@ def unsupported(names: str, kind: str) -> None:
 
 
 @dataclass(eq=False)
-class Node:
+class Node(Part):
     """A plugin of a scene with its parameters."""
 
     plugin: str
@@ -100,35 +87,13 @@ class Node:
             raise KeyError(f"{self.plugin} does not read {name}")
         return self.values.get(name, default)
 
-    def number(self, name: str, default: float, holds: Any = None, limit: str = "") -> float:
-        """Return a number."""
-        value = self.get(name, default)
-        return number(name, value) if holds is None else number(name, value, holds, limit)
-
-    def whole(self, name: str, default: int, least: int = 0, most: int = 2**31) -> int:
-        """Return a whole number."""
-        limit = f"a whole number from {least} to {most}"
-        return int(self.number(name, default, lambda x: x == int(x) and least <= x <= most, limit))
-
-    def flag(self, name: str, default: bool = False) -> bool:
-        """Return True or False."""
-        value = self.get(name, default)
-        return bool(one_of(name, bool(value) if isinstance(value, np.bool_) else value, (True, False)))
-
-    def text(self, name: str, default: str | None = None) -> str:
-        """Return a string."""
-        value = self.get(name, default)
-        if not isinstance(value, str):
-            raise SceneError(f"{name} is {in_brief(value)}; it must be a string")
-        return value
+    def one(self, name: str, default: Any, *types: str) -> Any:
+        """Return a parameter; the format has no types."""
+        return self.get(name, default)
 
     def choice(self, name: str, default: str, choices: tuple[str, ...]) -> str:
-        """Return one of some strings."""
+        """Return one of some strings, in small letters."""
         return str(one_of(name, self.text(name, default).lower(), choices))
-
-    def vector(self, name: str, default: Any) -> np.ndarray:
-        """Return a point or vector, (3,)."""
-        return finite_array(name, self.get(name, default), (3,))
 
     def matrix(self, name: str = "to_world") -> Matrix:
         """Return a transform, (4, 4)."""
@@ -146,26 +111,10 @@ class Node:
 
 
 @dataclass
-class Job:
+class Job(Conversion[Node]):
     """The conversion of one scene."""
 
-    name: str  # for messages
-    files: SceneFiles
-    find: Callable[[str], Path]  # the path of a file that the scene names
-    read_mesh: Callable[[Path], list[RawMesh]]
-    strict: bool
-    lost: Losses = field(default_factory=Losses)
-    made: dict[Any, Any] = field(default_factory=dict)  # what was converted already
-    eye: np.ndarray | None = None  # where the camera stands
-    said: str = ""  # the message of an error that names its place
-    triangles: int = 0
-    instances: int = 0
-
-    def convert(self, node: Node) -> Any:
-        """Return what becomes of a plugin; the same object for the same plugin."""
-        if node not in self.made:
-            self.made[node] = self._converted(node)
-        return self.made[node]
+    eye: Doubles | None = None  # where the camera stands
 
     def check(self, node: Node) -> None:
         """Note the parameters of a plugin that are not read."""
@@ -184,21 +133,13 @@ class Job:
             raise SceneError(f"{node.label} holds no {kind}")
         return held[0]
 
-    def _converted(self, node: Node) -> Any:
+    def converted(self, node: Node) -> Any:
+        """Return what becomes of a plugin."""
         entry = PLUGINS[node.plugin]
         if entry.convert is None:
-            made, instead = INSTEAD.get(entry.kind, (None, "left out"))
-            node.lose(instead)
-            return made
+            return self.instead(node, entry.kind)
         self.check(node)
-        try:
-            return entry.convert(node, self)
-        except SceneError as error:
-            if str(error) == self.said:
-                raise
-            placed = SceneError(f"{node.label}: {str(error).removeprefix(f'{self.name}: ')}")
-            self.said = str(placed)
-            raise placed from error
+        return entry.convert(node, self)
 
 
 class Graph:

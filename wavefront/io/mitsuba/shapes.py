@@ -2,20 +2,22 @@
 
 from __future__ import annotations
 
-from copy import copy, deepcopy
+from copy import deepcopy
 from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
 from ...arrays.elementary import sin_cos_turns
-from ...arrays.vec import Doubles, Ints
+from ...arrays.vec import Doubles
 from ...bsdfs import Diffuse, Sides
 from ...core.errors import SceneError
 from ...materials import Material
 from ...shapes import Cylinders, Instance, Mesh, Shape, Sphere
 from ...shapes.transform import Matrix
 from ...textures.image import Texture
+from ..conversion import textures_in
+from ..joining import stacked
 from ..placing import moved_raw
 from ..repair import RawMesh, build
 from .attributes import with_attribute
@@ -81,7 +83,7 @@ def _cylinder(node: Node, job: Job) -> list[Shape]:
     around = np.linalg.norm(matrix[:3, :3] @ axes[:, :2], axis=0)
     needs_faces = emission is not None or node.held("sensor") or node.flag("flip_normals")
     even = abs(around[1] - around[0]) <= ROUND * around[0]
-    if even and not needs_faces and not _textures(material, set()):
+    if even and not needs_faces and not textures_in(material, Texture):
         ends = np.stack([start, end]) @ matrix[:3, :3].T + matrix[:3, 3]
         pipe = Cylinders(ends[:1], ends[1:], radius * around[0], caps=False, material=material)
         return [_named(pipe, node)]
@@ -116,7 +118,7 @@ def _sphere(node: Node, job: Job) -> list[Shape]:
     closed = job.eye is None or bool(np.linalg.norm(job.eye - center) > radius)
     material, emission = _appearance(node, job, closed)
     turn = None
-    if _textures((material, emission), set()):
+    if textures_in((material, emission), Texture):
         material, emission = _for_spheres(material, emission, job)
         left, _, right = np.linalg.svd(matrix[:3, :3])
         turn = left @ right @ POLES
@@ -130,9 +132,8 @@ def _sphere(node: Node, job: Job) -> list[Shape]:
 @plugin("obj ply", "shape", f"{SURFACE} filename face_normals flip_tex_coords", PARTS)
 def _file(node: Node, job: Job) -> list[Shape]:
     path = job.find(node.text("filename"))
-    if path not in job.made:
-        job.made[path] = _one(str(path), job.read_mesh(path))
-    raw = with_attribute(job.name, replace(job.made[path]), node)
+    raw = job.once(path, lambda: _one(str(path), job.read_mesh(path)))
+    raw = with_attribute(job.name, replace(raw), node)
     if node.flag("flip_tex_coords", node.plugin == "obj") and raw.uvs is not None:
         raw = replace(raw, uvs=raw.uvs * (1, -1) + (0, 1))
     return _mesh(node, job, replace(raw, name=path.stem), smooth=True)
@@ -148,11 +149,9 @@ def _file(node: Node, job: Job) -> list[Shape]:
 def _serialized(node: Node, job: Job) -> list[Shape]:
     path = job.find(node.text("filename"))
     key = (path, node.whole("shape_index", 0))
-    if path not in job.made:
-        job.made[path] = job.files.read(path)
-    if key not in job.made:
-        job.made[key] = read_serialized(str(path), job.made[path], key[1], job.files)
-    return _mesh(node, job, job.made[key], smooth=True)
+    data = job.once(path, lambda: job.files.read(path))
+    raw = job.once(key, lambda: read_serialized(str(path), data, key[1], job.files))
+    return _mesh(node, job, raw, smooth=True)
 
 
 @plugin("shapegroup merge", "shape", holds="shape")
@@ -195,8 +194,7 @@ def _mesh(node: Node, job: Job, raw: RawMesh, smooth: bool = False, closed: bool
     if node.flag("flip_normals"):
         normals = None if raw.normals is None else -raw.normals
         raw = replace(raw, faces=raw.faces[:, ::-1], normals=normals)
-    job.triangles += len(raw.faces)
-    job.files.limits.check_triangles(job.name, job.triangles)
+    job.count(raw.faces)
     material, emission = _appearance(node, job, closed)
     name = node.id or raw.name
     raw = replace(raw, name=name, material=material, emission=emission, smooth=smooth, tangents=None)
@@ -221,35 +219,18 @@ def _appearance(node: Node, job: Job, closed: bool = False) -> tuple[Material, A
         material, one_sided = job.convert(bsdfs[0]), is_one_sided(bsdfs[0])
     interior = interior_of(node, job)
     if interior is not None:
-        inside = (id(material), id(interior))
-        if inside not in job.made:
-            job.made[inside] = copy(material)
-            job.made[inside].interior = interior
-        material = job.made[inside]
-    if not one_sided or closed:
-        return material, emission
-    key = (id(material), "one-sided")
-    if key not in job.made:
-        job.made[key] = copy(material)
-        job.made[key].bsdf = Sides(material.bsdf)
-    return job.made[key], emission
+        material = job.changed(material, interior=interior)
+    if one_sided and not closed:
+        bsdf = job.once((id(material.bsdf), Sides), lambda: Sides(material.bsdf))
+        material = job.changed(material, bsdf=bsdf)
+    return material, emission
 
 
 def _one(name: str, raws: list[RawMesh]) -> RawMesh:
     """Return all meshes of a file as one."""
     if not raws:
         raise SceneError(f"{name}: has no faces")
-    if len(raws) == 1:
-        return raws[0]
-    starts = np.cumsum([0] + [len(raw.vertices) for raw in raws])
-
-    def joined(field: str) -> Any:
-        parts = [getattr(raw, field) for raw in raws]
-        return None if any(part is None for part in parts) else np.concatenate(parts)
-
-    faces: Ints = np.concatenate([raw.faces + start for raw, start in zip(raws, starts[:-1], strict=True)])
-    normals, uvs, colors = (joined(field) for field in ("normals", "uvs", "colors"))
-    return RawMesh("", joined("vertices"), faces, normals, uvs, colors=colors)
+    return raws[0] if len(raws) == 1 else stacked("", raws)
 
 
 def _ring(radius: float) -> tuple[Doubles, Doubles]:
@@ -278,18 +259,7 @@ def _for_spheres(material: Material, emission: Any, job: Job) -> tuple[Material,
     both = (material, emission)
     key = (*map(id, both), "sphere")
     if key not in job.made:
-        kept = {id(each): upside_down(each) for each in _textures(both, set())}
+        kept = {id(each): upside_down(each) for each in textures_in(both, Texture)}
         job.made[key] = (deepcopy(both, {**kept, **{id(kept): list(kept.values())}}), both)
     found: tuple[Material, Any] = job.made[key][0]
     return found
-
-
-def _textures(thing: Any, seen: set[int]) -> list[Texture]:
-    """Return the images in a material, or in a part of one."""
-    if id(thing) in seen or not (isinstance(thing, tuple) or hasattr(thing, "__dict__")):
-        return []
-    seen.add(id(thing))
-    if isinstance(thing, Texture):
-        return [thing]
-    parts = thing if isinstance(thing, tuple) else vars(thing).values()
-    return [each for part in parts for each in _textures(part, seen)]

@@ -20,7 +20,7 @@ from ...core.errors import SceneError, as_array, finite_array, in_brief, number
 from ...textures.base import BaseTexture
 from ...textures.image import Texture
 from ...textures.vertex_colors import VertexColors
-from ..spectra import pairs_of, read_spectrum
+from ..spectra import pairs_of
 from ..text_lines import numbers
 from .nodes import Job, Node, plugin, unsupported
 
@@ -88,8 +88,7 @@ def constant(node: Node, job: Job, *, emission: bool, bounded: bool) -> Value:
         value = node.get("value")
         return finite_array("rgb", np.broadcast_to(value, 3) if np.ndim(value) == 0 else value, (3,))
     if "filename" in node.values:
-        path = job.find(node.text("filename"))
-        pairs: Any = read_spectrum(path, job.files.read(path))
+        pairs: Any = job.spectrum(node.text("filename"))
     elif "wavelengths" in node.values:
         columns = [listed(node, name) for name in ("wavelengths", "values")]
         pairs = list(zip(*columns, strict=False))

@@ -193,7 +193,7 @@ def _lens(node: Node, aspect: float) -> Perspective:
 
 def vertical_fov(node: Node, aspect: float) -> float:
     """Return the vertical field of view in degrees, of a picture `aspect` times as wide as high."""
-    return _degrees(_tan(_field_of_view(node, aspect)) / aspect)
+    return angle_of(half_tangent(_field_of_view(node, aspect)) / aspect)
 
 
 def _field_of_view(node: Node, aspect: float) -> float:
@@ -206,22 +206,22 @@ def _field_of_view(node: Node, aspect: float) -> float:
     else:
         (length,) = numbers("", "focal_length", node.text("focal_length", "50mm").removesuffix("mm"), (1,))
         number("focal_length", length, lambda x: x > 0, "above 0 mm")
-        angle, axis = _degrees(np.sqrt(36.0**2 + 24.0**2) / (2 * length)), "diagonal"
+        angle, axis = angle_of(np.sqrt(36.0**2 + 24.0**2) / (2 * length)), "diagonal"
     if axis in ("smaller", "larger"):
         axis = "y" if (axis == "smaller") == (aspect > 1) else "x"
     if axis == "x":
         return angle
     if axis == "y":
-        return _degrees(_tan(angle) * aspect)
-    return _degrees(_tan(angle) / np.sqrt(1 + 1 / aspect**2))
+        return angle_of(half_tangent(angle) * aspect)
+    return angle_of(half_tangent(angle) / np.sqrt(1 + 1 / aspect**2))
 
 
-def _tan(degrees: float) -> float:
+def half_tangent(degrees: float) -> float:
     """Return the tangent of half an angle."""
     sin, cos = sin_cos(np.float64(np.radians(degrees) / 2))
     return float(sin / cos)
 
 
-def _degrees(tangent: float) -> float:
+def angle_of(tangent: float) -> float:
     """Return the angle the tangent of whose half is given."""
     return float(2 * np.degrees(arctan2(np.float64(tangent), np.float64(1))))

@@ -4,23 +4,19 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, field
-from pathlib import Path
 from typing import Any, TypeVar
 
 import numpy as np
 
 from ...arrays.vec import Doubles, luminance
-from ...bsdfs import Diffuse
 from ...colors.spectrum import blackbody, spectrum_rgb
-from ...core.errors import SceneError, in_brief, number, one_of
+from ...core.errors import SceneError, in_brief
 from ...core.suggestions import did_you_mean
-from ...materials import Material
 from ...shapes.transform import Matrix
+from ..conversion import Conversion, Part
 from ..losses import Losses
-from ..repair import RawMesh
-from ..sources import SceneFiles
-from ..spectra import METALS, read_spectrum
-from .parser import NUMBERS, Parameter, placed
+from ..spectra import METALS
+from .parser import NUMBERS, Parameter
 
 NEUTRAL = ("stdillum-D65", "illum-acesD60")
 # of glasses: index at 587.6 nm and Abbe number, by Schott's and Hoya's data sheets
@@ -39,20 +35,8 @@ def _dispersed(index: float, abbe: float) -> Doubles:
 NAMED = {f"glass-{name}": _dispersed(*given) for name, given in GLASSES.items()}
 for _name, _both in (METALS | {"CuZn": BRASS}).items():
     NAMED |= {f"metal-{_name}-eta": np.array(_both[0]), f"metal-{_name}-k": np.array(_both[1])}
-GRAY = Material(Diffuse(0.5))
 Converter = Callable[["Entity", "Job"], Any]
 TABLE: dict[tuple[str, str], Converter | None] = {}  # by kind and type; None: it is not supported
-# what stands for an entity that is not supported, and what the warning says of it
-INSTEAD: dict[str, tuple[Any, str]] = {
-    "material": (GRAY, "a gray Diffuse in its place"),
-    "texture": (0.5, "0.5 in its place"),
-    "filter": ({}, "the default in its place"),
-    "integrator": ({}, "path tracing in its place"),
-    "medium": (None, "left out"),
-    "shape": (None, "left out"),
-    "light": (None, "left out"),
-    "area light": (None, "left out"),
-}
 C = TypeVar("C", bound=Converter)
 
 
@@ -72,7 +56,7 @@ def unsupported(kind: str, types: str) -> None:
 
 
 @dataclass(eq=False)
-class Entity:
+class Entity(Part):
     """A shape, a material, a light, ... with its parameters."""
 
     kind: str
@@ -86,7 +70,7 @@ class Entity:
     name: str = ""  # of named ones
 
     @property
-    def label(self) -> str:
+    def label(self) -> str:  # type: ignore[override]
         """Where it is, and what, for messages."""
         return f"{self.place}: {self._what}"
 
@@ -120,35 +104,14 @@ class Entity:
         count = NUMBERS[types[0]]
         return None if found is None else found if count == 1 else found.reshape(-1, count)
 
-    def number(self, name: str, default: float, holds: Any = None, limit: str = "") -> float:
-        """Return a number."""
-        found = self.get(name, ("float", "integer"))
-        value = default if found is None else float(found[0])
-        return number(name, value) if holds is None else number(name, value, holds, limit)
-
-    def whole(self, name: str, default: int, least: int = 0, most: int = 2**31) -> int:
-        """Return a whole number."""
-        limit = f"a whole number from {least} to {most}"
-        return int(self.number(name, default, lambda x: x == int(x) and least <= x <= most, limit))
-
-    def flag(self, name: str, default: bool = False) -> bool:
-        """Return True or False."""
-        found = self.get(name, ("bool",))
-        return default if found is None else found[0] == "true"
-
-    def text(self, name: str, default: str = "") -> str:
-        """Return a string."""
-        found = self.get(name, ("string",))
-        return default if found is None else str(found[0])
-
-    def choice(self, name: str, default: str, choices: tuple[str, ...]) -> str:
-        """Return one of some strings."""
-        return str(one_of(name, self.text(name, default), choices))
-
-    def vector(self, name: str, default: tuple[float, ...]) -> Doubles:
-        """Return a point or vector, (3,)."""
-        found = self.array(name, ("point3", "vector3", "point", "vector"))
-        return np.array(default) if found is None else found[0]
+    def one(self, name: str, default: Any, *types: str) -> Any:
+        """Return the first value of a parameter of some types."""
+        found, count = self.get(name, types), NUMBERS.get(types[0], 1)
+        if found is None:
+            return default
+        if types == ("bool",):
+            return found[0] == "true"
+        return found[:count] if count > 1 else np.asarray(found).item(0)
 
     def spectrum(self, name: str, default: Any, job: Job, use: str = "albedo") -> Any:
         """Return a number, or a color (3,); `use` is "albedo", "light" or "unbounded".
@@ -180,12 +143,8 @@ class Entity:
             elif found[0] in NAMED:
                 return NAMED[found[0]]
             else:
-                path = job.find(found[0])
-                color = spectrum_rgb(
-                    read_spectrum(path, job.files.read(path)),
-                    emission=use == "light",
-                    bounded=use == "albedo",
-                )
+                pairs = job.spectrum(found[0])
+                color = spectrum_rgb(pairs, emission=use == "light", bounded=use == "albedo")
         elif len(found) == 1:
             return np.ones(3) if use == "light" else float(found[0])
         else:
@@ -198,42 +157,14 @@ class Entity:
 
 
 @dataclass
-class Job:
+class Job(Conversion[Entity]):
     """The conversion of one scene."""
 
-    files: SceneFiles
-    read_mesh: Callable[[Path], list[RawMesh]]
-    strict: bool
-    lost: Losses = field(default_factory=Losses)
     named: dict[tuple[str, str], Entity] = field(default_factory=dict)  # by kind and name
-    made: dict[Any, Any] = field(default_factory=dict)  # what was converted already
-    making: list[Entity] = field(default_factory=list)  # what refers to what is converted now
     film: Any = None  # the size of the picture, and its crop
     exposure: float = 1.0  # factor of all light, by the film
     world: Matrix = field(default_factory=lambda: np.eye(4))  # to the space of the scene: may mirror
     around: Any = None  # the medium where the camera stands
-    triangles: int = 0
-    instances: int = 0
-
-    def find(self, reference: str) -> Path:
-        """Return the path of a file that the scene names, which must exist."""
-        path = self.files.find(reference)
-        if not path.exists():
-            raise SceneError(f"file {reference!r} is missing")
-        return path
-
-    def convert(self, entity: Entity) -> Any:
-        """Return what becomes of an entity; the same object for the same entity."""
-        if entity not in self.made:
-            if entity in self.making:
-                raise SceneError(f"{entity.label}: refers to itself")
-            self.making.append(entity)
-            try:
-                with placed(entity.label):
-                    self.made[entity] = self._converted(entity)
-            finally:
-                self.making.pop()
-        return self.made[entity]
 
     def refer(self, kind: str, name: str) -> Entity:
         """Return a named entity."""
@@ -246,16 +177,15 @@ class Job:
         """Return a medium by its name; None where there is none."""
         return self.convert(self.refer("medium", name)) if name else None
 
-    def _converted(self, entity: Entity) -> Any:
+    def converted(self, entity: Entity) -> Any:
+        """Return what becomes of an entity."""
         key = (entity.kind.removeprefix("float ").removeprefix("spectrum "), entity.type)
         if key not in TABLE:
             known = [name for kind, name in TABLE if kind == key[0]]
             raise SceneError(f"pbrt has no such {key[0]}{did_you_mean(entity.type, known)}")
         convert = TABLE[key]
         if convert is None:
-            made, instead = INSTEAD[key[0]]
-            entity.lose(instead)
-            return made
+            return self.instead(entity, key[0])
         entity.unread = {name for name, given in entity.values.items() if not given.optional}
         if entity.kind == "shape":
             entity.unread.discard("alpha")  # it is read with the material

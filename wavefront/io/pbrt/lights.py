@@ -12,6 +12,7 @@ from ...codecs.encoding import codes_to_linear
 from ...core.errors import SceneError
 from ...lights import DirectionalLight, Environment, PointLight, Projector, SpotLight
 from ...textures.image import Texture
+from ..mitsuba.views import angle_of, half_tangent
 from .entities import Entity, Job, converts
 
 ROWS = 64  # of an environment that are looked up at once
@@ -47,7 +48,7 @@ def _point(entity: Entity, job: Job) -> PointLight:
 @converts("light", "goniometric")
 def _goniometric(entity: Entity, job: Job) -> PointLight:
     mean = 1.0
-    if entity.text("filename"):
+    if entity.text("filename", ""):
         entity.lose("how its light depends on the direction; the mean in its place")
         mean = float(_pixels(entity, job).mean())
     intensity = _strength(entity, "I", job) * (mean * _measured(entity, "power", 4 * np.pi * mean))
@@ -81,8 +82,7 @@ def _projection(entity: Entity, job: Job) -> Projector:
     height, width = slide.shape[:2]
     if np.linalg.det(matrix[:3, :3]) > 0:  # pbrt's x is to the right in a space that is left-handed
         slide = slide[:, ::-1]
-    sin, cos = sin_cos(np.float64(np.radians(entity.number("fov", 90.0)) / 2))
-    half = sin / cos * max(1, height / width)  # of the height
+    half = half_tangent(entity.number("fov", 90.0)) * max(1, height / width)  # of the height
     power = float(luminance(slide.mean((0, 1)))) * 4 * half * half * width / height
     entity.lose("the fall of its light toward the edges of its picture")
     return Projector(
@@ -90,7 +90,7 @@ def _projection(entity: Entity, job: Job) -> Projector:
         Texture(np.ascontiguousarray(slide)),
         entity.number("scale", 1.0) * job.exposure * _measured(entity, "power", power),
         direction=matrix[:3, 2],
-        fov=float(2 * np.degrees(arctan2(half, np.float64(1)))),
+        fov=angle_of(half),
         up=matrix[:3, 1],
     )
 
@@ -103,7 +103,7 @@ def _distant(entity: Entity, job: Job) -> DirectionalLight:
 
 @converts("light", "infinite")
 def _infinite(entity: Entity, job: Job) -> Environment:
-    if not entity.text("filename"):
+    if not entity.text("filename", ""):
         return Environment(_strength(entity, "L", job) * _measured(entity, "illuminance", np.pi))
     if "L" in entity.values:
         raise SceneError("has L and filename; give one of them")
@@ -128,7 +128,7 @@ def _area(entity: Entity, job: Job) -> tuple[Any, float, bool]:
     """Return the radiance, its luminance, and whether it leaves both sides."""
     sides = entity.flag("twosided")
     entity.number("power", -1.0)
-    if not entity.text("filename"):
+    if not entity.text("filename", ""):
         radiance = _strength(entity, "L", job)
         return radiance, float(luminance(np.broadcast_to(entity.spectrum("L", 1.0, job, "light"), 3))), sides
     pixels, factor = _pixels(entity, job), entity.number("scale", 1.0) * job.exposure
@@ -137,7 +137,7 @@ def _area(entity: Entity, job: Job) -> tuple[Any, float, bool]:
 
 def _pixels(entity: Entity, job: Job) -> Floats:
     """Return the linear colors of an image, (H, W, 3)."""
-    codes = job.files.image(job.find(entity.text("filename")))
+    codes = job.files.image(job.find(entity.text("filename", "")))
     pixels = codes_to_linear(codes) if codes.dtype.kind == "u" else codes.astype(np.float32)
     pixels = pixels[..., :3] if pixels.shape[2] >= 3 else np.repeat(pixels[..., :1], 3, 2)
     if not np.isfinite(pixels).all():

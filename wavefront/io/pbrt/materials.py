@@ -13,7 +13,6 @@ from ...bsdfs import (
     Conductor,
     Dielectric,
     Diffuse,
-    Measured,
     Mix,
     NullSurface,
     Plastic,
@@ -27,7 +26,8 @@ from ...media import GridMedium, HenyeyGreenstein, Medium
 from ...textures.base import BaseTexture
 from ...textures.image import Texture
 from ...textures.normal_map import BumpMap, NormalMap
-from .entities import GRAY, NAMED, Entity, Job, converts, unsupported
+from ..conversion import GRAY
+from .entities import NAMED, Entity, Job, converts, unsupported
 from .textures import Value, clipped, color, computed, fourth_root, scalar, square_root
 
 LEAST_INDEX = 1e-6
@@ -62,7 +62,7 @@ def _index(entity: Entity, name: str, job: Job, default: float = 1.5) -> Any:
 def _made(entity: Entity, bsdf: Any, job: Job) -> Material:
     """Return a material with the bumps of its entity."""
     bumps: Any = None
-    file = entity.text("normalmap")
+    file = entity.text("normalmap", "")
     if file:
         bumps = NormalMap(Texture(job.files.image(job.find(file)), srgb=False))
     height = scalar(entity, "displacement", 0.0, job)
@@ -212,11 +212,7 @@ def _interface(entity: Entity, job: Job) -> Material:
 
 @converts("material", "measured")
 def _measured(entity: Entity, job: Job) -> Material:
-    path = job.find(entity.text("filename"))
-    key = ("measured", path)
-    if key not in job.made:
-        job.made[key] = Measured.from_bytes(str(path), job.files.read(path))
-    return _made(entity, job.made[key], job)
+    return _made(entity, job.measured(entity), job)
 
 
 unsupported("material", "hair")
@@ -224,7 +220,7 @@ unsupported("material", "hair")
 
 @converts("medium", "homogeneous")
 def _homogeneous(entity: Entity, job: Job) -> Medium | None:
-    if entity.text("preset"):
+    if entity.text("preset", ""):
         entity.lose("preset; left out")
         return None
     absorbed, scattered = (entity.spectrum(name, 1.0, job, "unbounded") for name in ("sigma_a", "sigma_s"))
@@ -287,12 +283,4 @@ def material_of(state: Any, alpha: Value, job: Job, label: Entity) -> Material:
         label.lose(f"the medium {state.outside!r} outside")
     if alpha is None and inside is None:
         return base
-    key = (id(base), id(inside), alpha if not isinstance(alpha, BaseTexture) else id(alpha))
-    if key not in job.made:
-        made = copy(base)
-        made.interior = inside
-        made.alpha = alpha
-        made.derive()
-        job.made[key] = made
-    found: Material = job.made[key]
-    return found
+    return job.changed(base, interior=inside, alpha=alpha)

@@ -8,7 +8,6 @@ from __future__ import annotations
 import os
 import re
 from collections.abc import Iterator
-from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -18,9 +17,9 @@ import numpy as np
 from ...core.errors import SceneError, in_brief
 from ...core.files import decode_text
 from ...core.suggestions import did_you_mean
+from ..conversion import PlacedError, check_included, placed
 from ..sources import SceneFiles
 
-MOST_INCLUDED = 15  # files inside each other
 MOST = 1e100  # size of a number: the squares of larger ones overflow
 # what follows each name: s a string, w a word, n a number, m a matrix, p parameters; ? where it may be absent
 STATEMENTS = {
@@ -93,15 +92,7 @@ class _Reader:
                 yield statement
                 continue
             self._included += 1
-            most = self._files.limits.includes
-            if self._included > most:
-                raise SceneError(
-                    f"{statement.place}: includes more than {most} files; the limit is LoadLimits.includes"
-                )
-            if depth == MOST_INCLUDED:
-                raise SceneError(
-                    f"{statement.place}: files include each other; the limit is {MOST_INCLUDED} levels"
-                )
+            check_included(statement.place, self._files, self._included, depth)
             with placed(statement.place):
                 file = self._files.find(statement.words[0])
                 content = self._files.read(file)
@@ -110,22 +101,6 @@ class _Reader:
             yield from self.read(file, content, depth + 1)
             if statement.name == "Import":
                 yield Statement("AttributeEnd", statement.place, [], [], {})
-
-
-class PlacedError(SceneError):
-    """An error whose message names file and line."""
-
-
-@contextmanager
-def placed(place: str) -> Iterator[None]:
-    """Give errors a place, unless they have one."""
-    try:
-        yield
-    except PlacedError:
-        raise
-    except SceneError as error:
-        name = place.rpartition(" line ")[0]
-        raise PlacedError(f"{place}: {str(error).removeprefix(f'{name}: ')}") from error
 
 
 class _Text:

@@ -14,12 +14,13 @@ from ...arrays.vec import Doubles
 from ...core.errors import SceneError
 from ...scene import Scene
 from ...shapes.transform import Matrix, rotation, translation
+from ..conversion import placed
 from ..mitsuba.transforms import looking
 from ..repair import RawMesh
 from ..sources import SceneFiles
 from . import lights, materials, textures  # noqa: F401  they fill the table
 from .entities import Entity, Job
-from .parser import Parameter, Statement, placed, statements
+from .parser import Parameter, Statement, statements
 from .shapes import instances, place
 from .views import exposure_of, mirror_of
 
@@ -109,7 +110,7 @@ class Reader:
                 found += instances(entity, job, np.array(matrices))
         lamps = [light for entity in self.lights if (light := job.convert(entity)) is not None]
         view = None if camera is None else job.convert(camera)
-        job.lost.report(str(job.files.scene), job.strict)
+        job.lost.report(job.name, job.strict)
         return Scene(found, lamps, view, settings=settings, medium=job.around)
 
     def _entity(self, kind: str, statement: Statement, target: str, type: str, name: str = "") -> Entity:
@@ -240,7 +241,7 @@ class Reader:
     def _make(self, statement: Statement, target: str) -> None:
         """Note a named material or medium, whose type is a parameter."""
         entity = self._entity(target, statement, target, "", statement.words[0])
-        entity.type = entity.text("type")
+        entity.type = entity.text("type", "")
         if not entity.type:
             raise SceneError(f"{statement.name} {entity.name!r} has no type")
         del entity.values["type"]
@@ -305,7 +306,14 @@ def read_scene(
     SceneError
         If it is malformed, or a file that it includes. The message names file and line.
     """
-    reader = Reader(Job(files, read_mesh, strict))
+
+    def find(reference: str) -> Path:
+        path = files.find(reference)
+        if not path.exists():
+            raise SceneError(f"file {reference!r} is missing")
+        return path
+
+    reader = Reader(Job(os.fspath(files.scene), files, find, read_mesh, strict))
     for statement in statements(files, Path(os.fspath(files.scene)), data):
         with placed(statement.place):
             reader.run(statement)

@@ -14,12 +14,12 @@ from ...core.errors import SceneError
 from ...shapes import Instance, Mesh, Shape, Sphere
 from ...shapes.transform import Matrix
 from ...textures.base import BaseTexture
+from ..conversion import placed, textures_in
 from ..placing import in_range, moved_raw
 from ..repair import RawMesh, build
 from ..trimesh_import import import_trimesh
 from .entities import Entity, Job, converts, unsupported
 from .materials import material_of
-from .parser import placed
 from .textures import clipped, computed, product, scalar
 
 SIDES, RINGS = 128, 64  # of round shapes that are meshes
@@ -94,13 +94,12 @@ def _bilinear_mesh(entity: Entity, job: Job) -> RawMesh:
 
 @converts("shape", "plymesh")
 def _ply_mesh(entity: Entity, job: Job) -> RawMesh:
-    path = job.find(entity.text("filename"))
-    if path not in job.made:
-        raws = job.read_mesh(path)
-        if not raws:
-            raise SceneError(f"{path}: has no faces")
-        job.made[path] = _checked(raws[0])
-    return replace(job.made[path], name=path.name.partition(".")[0], colors=None)
+    path = job.find(entity.text("filename", ""))
+    raws = job.once(path, lambda: job.read_mesh(path))
+    if not raws:
+        raise SceneError(f"{path}: has no faces")
+    raw = job.once((path, "checked"), lambda: _checked(raws[0]))
+    return replace(raw, name=path.name.partition(".")[0], colors=None)
 
 
 @converts("shape", "loopsubdiv")
@@ -209,7 +208,7 @@ def _exact_sphere(entity: Entity, job: Job, matrix: Matrix) -> Sphere | None:
     alpha, radius = _opacity(entity, entity.state.area, job), _radius(entity) * scale[0]
     material = material_of(entity.state, alpha, job, entity)
     emission, _ = _emission(entity.state.area, 4 * np.pi * radius**2, job)
-    if has_textures(material) or isinstance(emission, BaseTexture):
+    if textures_in((material, emission)):
         return None
     return Sphere(matrix[:3, 3], radius, material=material, emission=emission)
 
@@ -217,7 +216,7 @@ def _exact_sphere(entity: Entity, job: Job, matrix: Matrix) -> Sphere | None:
 def _mesh(entity: Entity, job: Job, matrix: Matrix, light: Entity | None) -> Mesh | None:
     """Return the mesh of a shape, placed by a matrix, which may be an area light."""
     raw = job.convert(entity)
-    if raw is None:
+    if not raw:
         return None
     if not in_range(matrix[None])[0]:
         raise SceneError("is placed by a matrix whose elements are too large")
@@ -225,11 +224,10 @@ def _mesh(entity: Entity, job: Job, matrix: Matrix, light: Entity | None) -> Mes
         raw = moved_raw(_facing(raw, entity.state.reverse), matrix)
         a, b, c = (raw.vertices[raw.faces[:, i]] for i in range(3))
         area = float(np.linalg.norm(np.cross(b - a, c - a), axis=1).sum()) / 2 if light else 0.0
-    job.triangles += len(raw.faces)
-    job.files.limits.check_triangles(str(job.files.scene), job.triangles)
+    job.count(raw.faces)
     raw.material = material_of(entity.state, _opacity(entity, light, job), job, entity)
     raw.emission, raw.two_sided = _emission(light, area, job)
-    if raw.uvs is None and (has_textures(raw.material) or isinstance(raw.emission, BaseTexture)):
+    if raw.uvs is None and textures_in((raw.material, raw.emission)):
         uvs = np.tile([[0.0, 0], [1, 0], [1, 1]], (len(raw.faces), 1))  # of each triangle, as in pbrt
         raw = _corners_apart(raw, raw.faces.ravel(), uvs)
         raw.faces = np.arange(len(uvs)).reshape(-1, 3)
@@ -277,10 +275,3 @@ def _corners_apart(raw: RawMesh, corners: Ints, uvs: Doubles) -> RawMesh:
     """Return a mesh with a vertex for each corner (n,) of its faces, and texture coordinates (n, 2)."""
     normals = None if raw.normals is None else raw.normals[corners]
     return replace(raw, vertices=raw.vertices[corners], normals=normals, uvs=uvs)
-
-
-def has_textures(thing: Any) -> bool:
-    """Return whether a material, or a part of one, is a texture."""
-    if isinstance(thing, BaseTexture):
-        return True
-    return hasattr(thing, "__dict__") and any(has_textures(part) for part in vars(thing).values())

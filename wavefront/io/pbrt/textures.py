@@ -166,7 +166,7 @@ unsupported("texture", "bilerp directionmix dots fbm marble ptex windy wrinkled"
 
 def image(entity: Entity, job: Job, channel: str | None) -> Texture:
     """Return an image texture."""
-    path = job.find(entity.text("filename"))
+    path = job.find(entity.text("filename", ""))
     codes = job.files.image(path)
     encoding = entity.text("encoding", "sRGB" if path.suffix.lower() == ".png" else "linear")
     if codes.dtype.kind == "u" and encoding.startswith("gamma"):

@@ -6,11 +6,11 @@ from typing import Any
 
 import numpy as np
 
-from ...arrays.elementary import arctan2, sin_cos
 from ...camera import Camera
 from ...camera.projection import Orthographic, Perspective, Projection
 from ...core.errors import SceneError
 from ...shapes.transform import Matrix
+from ..mitsuba.views import angle_of, half_tangent
 from .entities import Entity, Job, converts, unsupported
 
 Settings = dict[str, Any]
@@ -52,11 +52,10 @@ def _camera(entity: Entity, job: Job) -> Camera:
         if entity.type != "perspective":
             entity.lose("a perspective camera in its place")
         angle = entity.number("fov", 90.0, lambda x: 0 < x < 180, "above 0 and below 180 degrees")
-        sin, cos = sin_cos(np.float64(np.radians(angle) / 2))
-        half = sin / cos * (y1 - y0) / 2
+        half = half_tangent(angle) * (y1 - y0) / 2
         distance = entity.number("focaldistance", 1e6)
         lens = Perspective(
-            float(2 * np.degrees(arctan2(half, np.float64(1)))),
+            angle_of(half),
             shift=((x0 + x1) / 2 / (x1 - x0), (y0 + y1) / 2 / (y1 - y0)),
             pixel_aspect=shape,
             aperture=2 * radius * scale[0],
