@@ -669,6 +669,15 @@ def test_the_medium_around_all_shapes() -> None:
         scene(False, fog=fog, one=ball, two={"type": "cube", "exterior": {"type": "homogeneous"}})
 
 
+@pytest.mark.parametrize("name", ["volpath", "volpathmis", "path", "direct", "ptracer", "prb", "moment"])
+def test_media_are_seen_by_integrators_that_see_them_in_mitsuba(name: str) -> None:
+    ball = {"type": "sphere", "interior": FOG, "exterior": {"type": "homogeneous"}}
+    inner = {"inner": {"type": "path"}} if name == "moment" else {}
+    made = scene(integrator={"type": name, **inner}, ball=ball)
+    seen = name.startswith("volpath")
+    assert (made.shapes[0].material.interior is not None) == (made.medium is not None) == seen
+
+
 def test_media_on_grids(tmp_path: Path) -> None:
     """Files of one and of three channels, constant ones, and where they are."""
     grid = np.random.default_rng(1).random((4, 3, 2, 3)).astype("<f4")

@@ -272,3 +272,8 @@ def test_a_default_that_is_given_counts_before_the_scene(
         rest = ["-o", str(tmp_path / "out.npz"), "--quiet", "--spp", "1", "--size", "4x4", *given]
         assert main(["render", str(path), *rest]) == 0
     assert bounces == [12, 1]
+
+
+def test_a_file_keeps_the_medium_around(tmp_path: Path) -> None:
+    fog = "<sensor type='perspective'> <medium type='homogeneous' id='fog'/> </sensor>"
+    assert isinstance(load(tmp_path, BALL + fog).medium, wf.Medium)

@@ -166,7 +166,7 @@ def _read_mitsuba(files: SceneFiles, data: bytes, options: LoadOptions) -> Conte
     scene = convert(
         name, document.scene, files, document.find, mesh_reader(files, options.strict), options.strict
     )
-    return Contents([], Places.once(0), scene.lights, scene.camera, scene.shapes, settings=scene.settings)
+    return _contents(scene)
 
 
 def _read_usd(files: SceneFiles, data: bytes, options: LoadOptions) -> Contents:
@@ -181,7 +181,11 @@ PARTS = ("lights", "camera", "shapes", "settings", "medium")  # of a scene, that
 def _read_pbrt(files: SceneFiles, data: bytes, options: LoadOptions) -> Contents:
     from .pbrt.scene import read_scene  # here, as programs that read no such scene need not pay for it
 
-    scene = read_scene(files, data, mesh_reader(files, options.strict), options.strict)
+    return _contents(read_scene(files, data, mesh_reader(files, options.strict), options.strict))
+
+
+def _contents(scene: Scene) -> Contents:
+    """Return a scene as the contents of a file."""
     return replace(Contents.once([]), **{name: getattr(scene, name) for name in PARTS})
 
 

@@ -13,7 +13,7 @@ from ..sources import SceneFiles
 from . import bsdfs, emitters, shapes, textures, volumes  # noqa: F401  they fill the table
 from .media import medium_around
 from .nodes import Graph, Job, Node, plugin
-from .views import check_clipping, meter_on
+from .views import check_clipping, meter_on, sees_media
 
 
 def convert(
@@ -65,11 +65,13 @@ def _scene(node: Node, job: Job) -> Scene:
         node.lose(f"the further sensor {sensor.plugin!r}")
     camera, settings = seen[0][2] if seen else (None, {})
     job.eye = None if camera is None else camera.origin
+    integrators = node.held("integrator")
+    job.sees_media = not integrators or sees_media(integrators[0])
     found = [shape for part in parts for shape in job.convert(part)]
     lamps = [part for part in node.held("emitter") if part.plugin != "area"]
     made = [light for part in lamps if (light := job.convert(part)) is not None]
     lights = [light for each in made for light in (each if isinstance(each, list) else [each])]
-    for integrator in node.held("integrator")[:1]:
+    for integrator in integrators[:1]:
         settings = settings | job.convert(integrator)
     if seen and camera is None:
         camera = _meter(*seen[0][:2], job)

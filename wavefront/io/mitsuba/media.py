@@ -78,7 +78,7 @@ unsupported("sggx tabphase", "phase")
 
 def interior_of(node: Node, job: Job) -> BaseMedium | None:
     """Return the medium inside of a shape; None for none."""
-    inside = node.values.get("interior")
+    inside = node.values.get("interior") if job.sees_media else None
     return job.convert(inside) if isinstance(inside, Node) and inside.kind == "medium" else None
 
 
@@ -89,6 +89,8 @@ def medium_around(node: Node, job: Job) -> BaseMedium | None:
     outside = [each.values.get("exterior") for each in shapes]
     outside += [medium for sensor in node.held("sensor") for medium in sensor.held("medium")]
     nodes = [each for each in outside if isinstance(each, Node) and each.kind == "medium"]
+    if not job.sees_media:
+        return None
     around = list(dict.fromkeys(each for each in nodes if id(each) not in inside))
     for another in around[1:]:
         another.lose("another medium around all shapes")

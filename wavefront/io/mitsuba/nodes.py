@@ -115,6 +115,7 @@ class Job(Conversion[Node]):
     """The conversion of one scene."""
 
     eye: Doubles | None = None  # where the camera stands
+    sees_media: bool = True  # whether the integrator does
 
     def check(self, node: Node) -> None:
         """Note the parameters of a plugin that are not read."""

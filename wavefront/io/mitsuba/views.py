@@ -22,6 +22,7 @@ ENDLESS = 2**16  # bounces, where there is no limit
 CLIPPED = "to_world near_clip far_clip focus_distance"
 NO_CLIPPING = "near_clip and far_clip do not cut; named where they would"
 FIELD_OF_VIEW = "fov fov_axis focal_length"
+SURFACES = ("path", "direct", "ptracer", "prb")  # integrators that see no media
 METER = "measures at one place, whatever the size of its film"
 LENS = f"{FIELD_OF_VIEW} principal_point_offset_x principal_point_offset_y"
 
@@ -154,6 +155,11 @@ def _integrator(node: Node, job: Job) -> Settings:
     if node.flag("hide_emitters"):
         settings["background"] = "transparent"
     return settings
+
+
+def sees_media(integrator: Node) -> bool:
+    """Return whether an integrator sees media: those that follow paths from surface to surface do not."""
+    return integrator.plugin not in SURFACES and all(map(sees_media, integrator.held("integrator")))
 
 
 unsupported(
