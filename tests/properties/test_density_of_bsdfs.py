@@ -35,7 +35,7 @@ from wavefront.bsdfs import (
 )
 from wavefront.bsdfs.measured import UP, _coordinates, _elevation, _turned
 from wavefront.bsdfs.microfacet import Facets, alpha_of
-from wavefront.bsdfs.rough import RoughBsdf
+from wavefront.bsdfs.rough import Microfacets
 from wavefront.sampling.warp import cosine_hemisphere_inverse
 
 f4 = np.float32
@@ -173,7 +173,7 @@ def facets_of(bsdf: Bsdf) -> list[Facets]:
         return [*facets_of(bsdf.first), *facets_of(bsdf.second)]
     if isinstance(bsdf, OpenPBRBsdf):
         return facets_of(bsdf._layers)[: 1 + bsdf._layers._coated]
-    found = [bsdf.facets()] if isinstance(bsdf, RoughBsdf) else []
+    found = [bsdf.facets()] if isinstance(bsdf, Microfacets) else []
     if isinstance(bsdf, ThinDisney):
         found.append(bsdf.facets_through())
     coated = isinstance(bsdf, Principled)

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..arrays.soa import soa
-from ..arrays.vec import Floats, Ints, f4
+from ..arrays.vec import Doubles, Floats, Ints, f4
 
 EMPTY = f4(3e38)  # an empty box, which no ray meets, extends from EMPTY to -EMPTY
 AT_ONCE = 1 << 16  # primitives that are split together, so that temporary arrays fit the cache
@@ -31,7 +31,7 @@ class Tree:
     child: NDArray[np.int32]  # (nodes, width) child codes, 0 where there is none
     prim: Ints  # (leaves, leaf size) primitives of each leaf, -1 where there is none
     cost: float  # SAH: expected boxes and leaves visited by a random line through the root's box
-    shape: NDArray[np.float64] | None  # (nodes, width, k) the result of `fit` for each child
+    shape: Doubles | None  # (nodes, width, k) the result of `fit` for each child
 
 
 def build_tree(
@@ -39,7 +39,7 @@ def build_tree(
     high: Floats,
     leaf_size: int,
     width: int,
-    fit: Callable[[Ints, Ints], NDArray[np.float64]] | None = None,
+    fit: Callable[[Ints, Ints], Doubles] | None = None,
 ) -> Tree:
     """Build over boxes `low`, `high` (3, m), m > 0. `width` is a power of two.
 
@@ -94,9 +94,7 @@ def build_tree(
     )
 
 
-def _fitted(
-    fit: Callable[[Ints, Ints], NDArray[np.float64]], members: Ints, start: Ints, count: Ints
-) -> NDArray[np.float64]:
+def _fitted(fit: Callable[[Ints, Ints], Doubles], members: Ints, start: Ints, count: Ints) -> Doubles:
     """Return the rows that `fit` gives for adjacent segments of `members`, a cache full at a time."""
     rows = []
     for group in _groups_of(count):
@@ -241,7 +239,7 @@ def stable_order(values: Ints) -> Ints:
 
 def _best_split(
     ids: Ints, begin: Ints, size: Ints, low: Floats, high: Floats, leaf_size: int
-) -> tuple[NDArray[np.float64], Ints]:
+) -> tuple[Doubles, Ints]:
     """Return the cost of each segment's best split, and the number of its sorted `ids` before it."""
     step = leaf_size * -(-size // (leaf_size * MAX_BINS))
     chunks = -(-size // step)

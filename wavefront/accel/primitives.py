@@ -12,7 +12,6 @@ from collections.abc import Sequence
 from typing import Any, ClassVar, Protocol, Self
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ..arrays.state import SoA
 from ..arrays.vec import Bools, Doubles, Floats, Ints
@@ -78,7 +77,7 @@ class CurvedPrimitives(Primitives):
 
     @classmethod
     @abstractmethod
-    def from_shapes(cls, shapes: Sequence[Any], center: NDArray[np.float64]) -> Self:
+    def from_shapes(cls, shapes: Sequence[Any], center: Doubles) -> Self:
         """Return the primitives of shapes, one after the other, relative to `center` (3,)."""
 
     @abstractmethod

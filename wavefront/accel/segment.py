@@ -12,7 +12,6 @@ from collections.abc import Sequence
 from typing import Any, ClassVar, Self
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ..arrays.elementary import arctan2
 from ..arrays.soa import soa
@@ -55,7 +54,7 @@ class SegmentPrimitives(CurvedPrimitives):
         return self.radius.size
 
     @classmethod
-    def from_shapes(cls, shapes: Sequence[Any], center: NDArray[np.float64]) -> Self:
+    def from_shapes(cls, shapes: Sequence[Any], center: Doubles) -> Self:
         """Return the primitives of shapes relative to `center` (3,)."""
         start = np.concatenate([shape.starts for shape in shapes]).T
         span = np.concatenate([shape.ends for shape in shapes]).T - start

@@ -6,7 +6,6 @@ from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ..arrays.soa import soa
 from ..arrays.vec import Bools, Doubles, Floats, Ints, dot, f4, normalize
@@ -33,7 +32,7 @@ class SpherePrimitives(CurvedPrimitives):
         return self.radii.size
 
     @classmethod
-    def from_shapes(cls, shapes: Sequence[Any], center: NDArray[np.float64]) -> SpherePrimitives:
+    def from_shapes(cls, shapes: Sequence[Any], center: Doubles) -> SpherePrimitives:
         """Return the spheres of shapes relative to `center` (3,)."""
         centers = np.concatenate([shape.centers - center for shape in shapes])
         radii = np.concatenate([np.broadcast_to(shape.radii, shape.count) for shape in shapes])

@@ -10,9 +10,8 @@ from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-from ..arrays.vec import Ints
+from ..arrays.vec import Bools, Ints
 from ..camera import Camera
 from ..compile.scene import CompiledScene
 from ..stages.alpha import covering_hits
@@ -55,7 +54,7 @@ def object_boxes(scene: CompiledScene, camera: Camera, shapes: ShapeTable) -> li
     ]
 
 
-def silhouettes(scene: CompiledScene, camera: Camera) -> Iterator[tuple[int, NDArray[np.bool_]]]:
+def silhouettes(scene: CompiledScene, camera: Camera) -> Iterator[tuple[int, Bools]]:
     """Yield the id of each shape and the pixels (height, width) that it would cover if it were alone.
 
     Shapes that would cover none are left out.

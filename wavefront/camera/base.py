@@ -328,7 +328,7 @@ class Camera:
 
     # --- Matrices -------------------------------------------------------------------------------
 
-    def intrinsics(self, pixel_centers: PixelCenters = "integer") -> NDArray[np.float64]:
+    def intrinsics(self, pixel_centers: PixelCenters = "integer") -> Doubles:
         """Return the matrix K (3, 3) of `from_intrinsics`, for the whole picture and without distortion.
 
         Parameters
@@ -345,14 +345,14 @@ class Camera:
         k[:2, 2] -= _to_film(pixel_centers)
         return k
 
-    def extrinsics(self) -> NDArray[np.float64]:
+    def extrinsics(self) -> Doubles:
         """Return the matrix (4, 4) from the world to OpenCV's camera space: x right, y down, z forward."""
         matrix = np.eye(4)
         matrix[:3, :3] = (self.rotation * (1, -1, -1)).T
         matrix[:3, 3] = -matrix[:3, :3] @ self.origin
         return matrix
 
-    def to_matrix(self, convention: Literal["opengl", "opencv"] = "opengl") -> NDArray[np.float64]:
+    def to_matrix(self, convention: Literal["opengl", "opencv"] = "opengl") -> Doubles:
         """Return the matrix (4, 4) from camera space to the world, as `from_matrix` takes it.
 
         Parameters
@@ -370,7 +370,7 @@ class Camera:
         matrix[:3, 3] = self.origin
         return matrix
 
-    def projection_matrix(self, near: float = 0.01, far: float = 1000) -> NDArray[np.float64]:
+    def projection_matrix(self, near: float = 0.01, far: float = 1000) -> Doubles:
         """Return OpenGL's projection matrix (4, 4), from camera space ("opengl") to clip coordinates.
 
         After division by the fourth component, x from -1 to 1 is the picture from left to right, y from
@@ -443,7 +443,7 @@ class Camera:
         return ((row + np.uint32(y0)) * whole + (pixel - row * width + np.uint32(x0))).astype(np.uint32)
 
     def pixel_rays(
-        self, pixel: Words, at: Floats, center: NDArray[np.float64], lens: Floats | None = None
+        self, pixel: Words, at: Floats, center: Doubles, lens: Floats | None = None
     ) -> tuple[Floats, Floats]:
         """Return origins and unit directions (3, n) of rays through points of pixels.
 
@@ -462,7 +462,7 @@ class Camera:
         return self.rays(x, y, center, lens)
 
     def rays(
-        self, x: Floats, y: Floats, center: NDArray[np.float64], lens: Floats | None = None
+        self, x: Floats, y: Floats, center: Doubles, lens: Floats | None = None
     ) -> tuple[Floats, Floats]:
         """Return origins and unit directions (3, n) of rays through film points.
 
@@ -482,7 +482,7 @@ class Camera:
         return origin, towards if towards.shape[1] == len(x) else np.repeat(towards, len(x), 1)
 
     def connections(
-        self, points: Floats, center: NDArray[np.float64], lens: Floats | None = None
+        self, points: Floats, center: Doubles, lens: Floats | None = None
     ) -> tuple[Floats, Doubles, Doubles]:
         """Connect points to the camera: return where rays end, their film points, and their importance.
 
@@ -523,9 +523,7 @@ class Camera:
         eye = column(self.origin - center) + self._turned(start.astype(f4))
         return eye, pixels, importance
 
-    def project(
-        self, points: ArrayLike, pixel_centers: PixelCenters = "half"
-    ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    def project(self, points: ArrayLike, pixel_centers: PixelCenters = "half") -> tuple[Doubles, Doubles]:
         """Return the pixel coordinates and depths of points of the world.
 
         Parameters
@@ -582,7 +580,7 @@ def _look(origin: ArrayLike, target: ArrayLike, up: ArrayLike) -> tuple[NDArray[
     return eye, _axes(backward / distance, up), distance
 
 
-def _axes(backward: NDArray[np.float64], up: ArrayLike) -> NDArray[np.float64]:
+def _axes(backward: Doubles, up: ArrayLike) -> Doubles:
     """Return the axes right, up and backward, (3, 3), as columns."""
     vertical = upward("Camera up", up)
     right = np.cross(vertical, backward)
@@ -606,7 +604,7 @@ def _to_film(pixel_centers: str) -> float:
     return CENTERS[one_of("pixel_centers", pixel_centers, tuple(CENTERS))]
 
 
-def _rigid(name: str, value: ArrayLike) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+def _rigid(name: str, value: ArrayLike) -> tuple[Doubles, Doubles]:
     """Return rotation (3, 3) and position (3,) of a (4, 4) or (3, 4) matrix."""
     rows = 3 if as_array(name, value).shape == (3, 4) else 4
     matrix = finite_array(name, value, (rows, 4))
@@ -615,7 +613,7 @@ def _rigid(name: str, value: ArrayLike) -> tuple[NDArray[np.float64], NDArray[np
     return rotation_matrix(f"{name}[:3, :3]", matrix[:3, :3]), matrix[:3, 3]
 
 
-def _extrinsics(R: ArrayLike, t: ArrayLike | None) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+def _extrinsics(R: ArrayLike, t: ArrayLike | None) -> tuple[Doubles, Doubles]:
     """Return rotation (3, 3) and translation (3,) from world to camera space."""
     if as_array("R", R).shape in ((4, 4), (3, 4)):
         if t is not None:
@@ -627,7 +625,7 @@ def _extrinsics(R: ArrayLike, t: ArrayLike | None) -> tuple[NDArray[np.float64],
     return axes, finite_array("t", np.ravel(t) if as_array("t", t).shape in ((3, 1), (1, 3)) else t, (3,))
 
 
-def upward(name: str, value: ArrayLike) -> NDArray[np.float64]:
+def upward(name: str, value: ArrayLike) -> Doubles:
     """Return the up vector of a picture, (3,) of any length, from a vector or the name of an axis.
 
     Raises

@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Callable
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
-from ..arrays.vec import Doubles
+from ..arrays.vec import Bools, Doubles
 from ..core.errors import SceneError
 from ..core.plural import plural
 
@@ -85,7 +85,7 @@ class Distortion:
                 u, v = u + (c * du - b * dv) / det, v + (a * dv - b * du) / det
         return u, v
 
-    def invertible(self, x: Doubles, y: Doubles) -> NDArray[np.bool_]:
+    def invertible(self, x: Doubles, y: Doubles) -> Bools:
         """Return a mask (n,) of the points between which and the axis the model does not fold."""
         way = np.arange(1, PATH_POINTS + 1)[:, None] / PATH_POINTS
         with np.errstate(all="ignore"):

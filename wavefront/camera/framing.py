@@ -6,7 +6,6 @@ Objects are spheres, mostly points: a picture contains what their convex hull co
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ..arrays.elementary import sin_cos_turns
 from ..arrays.vec import Doubles
@@ -19,7 +18,7 @@ SIDES = 32  # of the polygons about its circles
 Balls = tuple[Doubles, Doubles]  # centers (n, 3) and radii (n,)
 
 
-def fitting_offset(balls: Balls, axes: NDArray[np.float64], tangents: tuple[float, float]) -> Doubles:
+def fitting_offset(balls: Balls, axes: Doubles, tangents: tuple[float, float]) -> Doubles:
     """Return where a pinhole camera stands that sees all balls, from the origin along its axes, (3,).
 
     All that touches an edge of the picture lies in a plane through the camera, whose place follows from the
@@ -78,7 +77,7 @@ def _middle(one: _Side, other: _Side, tangent: float, distance: float) -> float:
     return min(max(middle, least), max(most, least))
 
 
-def turned_balls(balls: Balls, axes: NDArray[np.float64]) -> Balls:
+def turned_balls(balls: Balls, axes: Doubles) -> Balls:
     """Return balls that hold what others cover in a whole turn about the line of the second axis.
 
     Parameters

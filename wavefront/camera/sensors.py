@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ..arrays.state import Words
-from ..arrays.vec import Floats, f4
+from ..arrays.vec import Doubles, Floats, f4
 from ..core.errors import SceneError, as_array, finite_array, one_of
 from .base import MAX_SIDE, Camera
 from .projection import Orthographic
@@ -52,7 +52,7 @@ class Sensors(Camera):
         middle = (self.points.min(0) + self.points.max(0)) / 2
         super().__init__(middle, np.eye(3), Orthographic(1), (-(-count // rows), rows))
 
-    def _unit_directions(self, directions: ArrayLike | None) -> NDArray[np.float64]:
+    def _unit_directions(self, directions: ArrayLike | None) -> Doubles:
         """Return unit directions (n, 3)."""
         name = "directions" if self.sensor == "radiance" else "normals"
         shape = self.points.shape
@@ -74,11 +74,11 @@ class Sensors(Camera):
         return f"<Sensors: {self.sensor} at {len(self.points)} points>"
 
     @property
-    def extent(self) -> NDArray[np.float64]:
+    def extent(self) -> Doubles:
         """(k, 3) points that the sensors are between, scene units."""
         return self.points
 
-    def above(self, bounds: NDArray[np.float64]) -> Self:
+    def above(self, bounds: Doubles) -> Self:
         """Return the same sensors above surfaces that they may lie on; `bounds` (2, 3) are the scene's."""
         sensors = copy(self)
         size = np.linalg.norm(np.ptp(np.concatenate([self.extent, bounds]), axis=0))
@@ -86,7 +86,7 @@ class Sensors(Camera):
         return sensors
 
     @property
-    def places(self) -> NDArray[np.float64]:
+    def places(self) -> Doubles:
         """(n, 3) where paths start, scene units."""
         return self.points + self.lift * self.directions
 
@@ -117,7 +117,7 @@ class Sensors(Camera):
         return self
 
     def pixel_rays(
-        self, pixel: Words, at: Floats, center: NDArray[np.float64], lens: Floats | None = None
+        self, pixel: Words, at: Floats, center: Doubles, lens: Floats | None = None
     ) -> tuple[Floats, Floats]:
         """Return the points, and the directions to them from above: those of radiance as they look."""
         index = np.minimum(pixel, len(self.points) - 1)

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from ..arrays.frame import Frame
 from ..arrays.state import Words
-from ..arrays.vec import Doubles, Floats, column, f4
+from ..arrays.vec import Doubles, Floats, Ints, column, f4
 from ..sampling.warp import cosine_hemisphere, uniform_sphere, uniform_triangle
 from .sensors import Sensors
 
@@ -35,7 +35,7 @@ class SurfaceSensors(Sensors):
     def __init__(
         self,
         triangles: Doubles,
-        counts: NDArray[np.intp],
+        counts: Ints,
         spheres: Doubles,
         kind: str,
         side: float = 1.0,
@@ -92,7 +92,7 @@ class SurfaceSensors(Sensors):
         return sensors
 
     def pixel_rays(
-        self, pixel: Words, at: Floats, center: NDArray[np.float64], lens: Floats | None = None
+        self, pixel: Words, at: Floats, center: Doubles, lens: Floats | None = None
     ) -> tuple[Floats, Floats]:
         """Return points evenly over the surfaces, and directions to them."""
         index, u = np.minimum(pixel, len(self.points) - 1), np.broadcast_to(at, (2, len(pixel)))

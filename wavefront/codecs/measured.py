@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..arrays.vec import Floats, f4
+from ..arrays.vec import Doubles, Floats, f4
 from ..colors.spectrum import reflectance_weights
 from ..core.errors import SceneError
 
@@ -146,7 +146,7 @@ def _rising(name: str, field: str, values: Floats) -> Floats:
     return values.astype(f4)
 
 
-def _as_rgb(spectra: Floats, weights: NDArray[np.float64]) -> Floats:
+def _as_rgb(spectra: Floats, weights: Doubles) -> Floats:
     """Return the colors (3, p, t, k, k) of spectra (p, t, wavelengths, k, k)."""
     total = np.zeros((3, *spectra.shape[:2], *spectra.shape[3:]), f4)
     for at in range(spectra.shape[2]):

@@ -14,6 +14,7 @@ import math
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from ..arrays.vec import Doubles
 from ..core.errors import SceneError, as_array, number
 from .color import rgb
 
@@ -55,9 +56,7 @@ def to_photometric(radiometric: ArrayLike, *, efficacy: float = EFFICACY) -> NDA
     return np.asarray(values[..., 0] * weights[0] + values[..., 1] * weights[1] + values[..., 2] * weights[2])
 
 
-def from_photometric(
-    value: float, color: ArrayLike = 1.0, *, efficacy: float = EFFICACY
-) -> NDArray[np.float64]:
+def from_photometric(value: float, color: ArrayLike = 1.0, *, efficacy: float = EFFICACY) -> Doubles:
     """Return linear RGB (3,) of a color whose photometric quantity is `value`.
 
     Parameters

@@ -5,11 +5,10 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ..accel import KINDS, CurvedPrimitives, kind_of
 from ..arrays.soa import soa
-from ..arrays.vec import ALL, Floats, Ints, Lanes, f4, put, take
+from ..arrays.vec import ALL, Doubles, Floats, Ints, Lanes, f4, put, take
 from ..shapes import CurvedShape
 
 
@@ -28,7 +27,7 @@ class CurvedTable:
     colors: Floats | None  # (4, k) linear RGB and opacity; None if all are opaque white
 
     @classmethod
-    def of(cls, shapes: Sequence[CurvedShape], center: NDArray[np.float64]) -> CurvedTable:
+    def of(cls, shapes: Sequence[CurvedShape], center: Doubles) -> CurvedTable:
         """Return the primitives of shapes, which `order_by_kind` has ordered, relative to `center` (3,)."""
         members: dict[type[CurvedPrimitives], list[CurvedShape]] = {}
         for shape in shapes:

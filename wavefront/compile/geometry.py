@@ -5,9 +5,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
-from ..arrays.vec import Bools, Floats, Ints, cross, f4, length, spans
+from ..arrays.vec import Bools, Doubles, Floats, Ints, cross, f4, length, spans
 from ..shapes import Mesh
 
 AT_ONCE = 1 << 14  # triangles that are made in float64 together, so that they fit the cache
@@ -20,9 +19,7 @@ def same_as_next(*of_triangles: Ints) -> Bools:
     return same
 
 
-def gather_triangles(
-    meshes: Sequence[Mesh], vertices: Sequence[NDArray[np.float64]]
-) -> tuple[Floats, Floats]:
+def gather_triangles(meshes: Sequence[Mesh], vertices: Sequence[Doubles]) -> tuple[Floats, Floats]:
     """Return the triangles (m, 3, 3) of meshes in float32, and their unit normals (3, m).
 
     `vertices` (n, 3) of each mesh are relative to where its triangles are traced.
@@ -39,7 +36,7 @@ def gather_triangles(
     return triangles, normals
 
 
-def compute_face_normals(triangles: NDArray[np.float64]) -> Floats:
+def compute_face_normals(triangles: Doubles) -> Floats:
     """Return the unit normals (3, m) of triangles (m, 3, 3); 0 where a triangle is degenerate."""
     a, b, c = np.ascontiguousarray(triangles.transpose(1, 2, 0))
     normal = cross(b - a, c - a)

@@ -6,9 +6,8 @@ from collections.abc import Sequence
 from typing import Any, TypeAlias
 
 import numpy as np
-from numpy.typing import NDArray
 
-from ..arrays.vec import Floats, Ints, f4
+from ..arrays.vec import Doubles, Floats, Ints, f4
 from ..core.errors import SceneError
 from ..core.plural import plural
 from ..lights import (
@@ -41,7 +40,7 @@ from .light_groups import GroupNumbers, LightGroups, primitive_count
 Part: TypeAlias = tuple[LightRecord, Ints | None]
 
 
-def find_backdrop(scene: Scene, scale: float, center: NDArray[np.float64]) -> InfiniteLight | None:
+def find_backdrop(scene: Scene, scale: float, center: Doubles) -> InfiniteLight | None:
     """Return what the camera sees of lights at infinity, None if it sees these themselves."""
     shown = [light.backdrop or light if isinstance(light, Environment) else light for light in scene.lights]
     if shown == list(scene.lights):
@@ -56,9 +55,9 @@ def gather_lights(
     scale: float,
     meshes: Sequence[Mesh],
     curved: Sequence[CurvedShape],
-    vertices: Sequence[NDArray[np.float64]],
-    center: NDArray[np.float64],
-    half_size: NDArray[np.float64],
+    vertices: Sequence[Doubles],
+    center: Doubles,
+    half_size: Doubles,
     choice: str | LightSamplerMaker,
     mis: bool,
 ) -> tuple[LightTable, LightGroups, Ints, int]:
@@ -127,7 +126,7 @@ def _first_rows(shapes: Sequence[Mesh | CurvedShape]) -> tuple[dict[int, int], i
     return first_row, count
 
 
-def _checked_record(light: Light, scale: float, center: NDArray[np.float64]) -> LightRecord:
+def _checked_record(light: Light, scale: float, center: Doubles) -> LightRecord:
     """Return the record of a light whose lengths are multiplied by `scale`, relative to `center` (3,)."""
     record = (light if scale == 1 else light.scaled(scale)).record(center)
     if not isinstance(record, LightRecord):
@@ -179,9 +178,7 @@ def _rows_of(
     return first_row[id(same[0])] + np.arange(faces)
 
 
-def _sphere_lights(
-    curved: Sequence[CurvedShape], first_row: dict[int, int], center: NDArray[np.float64]
-) -> list[Part]:
+def _sphere_lights(curved: Sequence[CurvedShape], first_row: dict[int, int], center: Doubles) -> list[Part]:
     """Return the lights of emitting spheres, if there are any."""
     emitting = [shape for shape in curved if shape.emission is not None]
     for shape in emitting:
@@ -207,7 +204,7 @@ def _sphere_lights(
     return [(TexturedSphereLights(*plain, prim=prim, source=source, emissions=emissions), every)]
 
 
-def _lights_of_spheres(shape: Any, center: NDArray[np.float64]) -> SphereLights:
+def _lights_of_spheres(shape: Any, center: Doubles) -> SphereLights:
     """Return the lights of a shape of emitting spheres, relative to `center` (3,); the mean of a texture."""
     middles = np.ascontiguousarray((shape.centers - center).T, f4)
     if isinstance(shape.emission, BaseTexture):
@@ -218,7 +215,7 @@ def _lights_of_spheres(shape: Any, center: NDArray[np.float64]) -> SphereLights:
     return SphereLights(middles, radii, radiance)
 
 
-def _area_lights(meshes: Sequence[Mesh], vertices: Sequence[NDArray[np.float64]]) -> list[Part]:
+def _area_lights(meshes: Sequence[Mesh], vertices: Sequence[Doubles]) -> list[Part]:
     """Return the emitting rectangles and triangles of all meshes, a record for each kind.
 
     Only uniform emission is taken for rectangles, as their points have no barycentric weights.
@@ -288,14 +285,14 @@ def _distinct_emissions(
     return tuple(emissions), of_shape
 
 
-def _radiance(mesh: Mesh, triangles: NDArray[np.float64]) -> Floats:
+def _radiance(mesh: Mesh, triangles: Doubles) -> Floats:
     """Return the radiance of each face of an emitting mesh, its mean where it varies, (3, k)."""
     if has_textured_emission(mesh):
         return mean_radiance(mesh, triangles)
     return np.broadcast_to(np.asarray(mesh.emission, f4), (3, len(triangles)))
 
 
-def _with_area(meshes: Sequence[Mesh], mesh_of: Ints, triangles: NDArray[np.float64]) -> Ints:
+def _with_area(meshes: Sequence[Mesh], mesh_of: Ints, triangles: Doubles) -> Ints:
     """Return which triangles (k, 3, 3) of emitting meshes, numbered `mesh_of` (k,), have an area."""
     edges = np.cross(triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0])
     shining = np.flatnonzero((edges != 0).any(1))

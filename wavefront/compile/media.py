@@ -179,7 +179,7 @@ def media_table(
     shapes: Sequence[Shape],
     materials: Sequence[Material],
     media: Sequence[BaseMedium],
-    center: NDArray[np.float64],
+    center: Doubles,
 ) -> MediaTable | None:
     """Return the table of the media of a scene; None if it needs none.
 

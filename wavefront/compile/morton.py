@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..arrays.soa import soa
-from ..arrays.vec import Floats, f4
+from ..arrays.vec import Doubles, Floats, f4
 
 BITS = 5  # along each axis: codes have 15 bits, and NumPy sorts integers of 16 bits by radix
 
@@ -27,7 +27,7 @@ class MortonGrid:
     per_unit: np.float32  # cells per unit of length
 
     @classmethod
-    def over(cls, half: NDArray[np.float64]) -> MortonGrid:
+    def over(cls, half: Doubles) -> MortonGrid:
         """Return a grid over a box around 0 with these half sides (3,)."""
         return cls((-half).astype(f4), f4((1 << BITS) / max(2 * float(half.max()), 1e-30)))
 

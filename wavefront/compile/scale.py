@@ -13,8 +13,8 @@ from copy import copy
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ..arrays.vec import Doubles
 from ..core.errors import SceneError
 from ..lights import Light
 from ..materials import Material
@@ -79,7 +79,7 @@ def _with_material(shape: Any, material: Material) -> Any:
     return changed
 
 
-def check_lights(lights: Iterable[Light], center: NDArray[np.float64], factor: float) -> None:
+def check_lights(lights: Iterable[Light], center: Doubles, factor: float) -> None:
     """Check that no light is so far away that float32 cannot square its distance.
 
     Raises
@@ -93,9 +93,7 @@ def check_lights(lights: Iterable[Light], center: NDArray[np.float64], factor: f
                 check_distance(f"{type(light).__name__} position", corner, center, factor)
 
 
-def check_distance(
-    name: str, position: NDArray[np.float64], center: NDArray[np.float64], factor: float
-) -> None:
+def check_distance(name: str, position: Doubles, center: Doubles, factor: float) -> None:
     """Check that float32 can square the distance of a position (3,) from the scene.
 
     Parameters

@@ -5,11 +5,10 @@ from __future__ import annotations
 from collections.abc import Callable
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ..accel import Accelerator, Geometry, InstanceAccelerator
 from ..arrays.soa import soa
-from ..arrays.vec import Bools, Floats, Ints
+from ..arrays.vec import Bools, Doubles, Floats, Ints
 from ..camera import Camera
 from ..lights import InfiniteLight, LightTable
 from ..lights.choice import LightSamplerMaker
@@ -52,7 +51,7 @@ class CompiledScene:
     """
 
     scale: float  # power of two that lengths of the scene are multiplied by; 1 for most scenes
-    center: NDArray[np.float64]  # (3,)
+    center: Doubles  # (3,)
     accelerator: Accelerator
     triangles: int  # number of triangles
     normals: Floats  # (3, m) unit geometric normals of the triangles

@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
-Mask = NDArray[np.bool_]
+from ..arrays.vec import Bools
+
+Mask = Bools
 
 
 def mask_box(mask: Mask) -> list[int] | None:

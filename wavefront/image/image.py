@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ..arrays.vec import Floats
+from ..arrays.vec import Bools, Doubles, Floats
 from ..camera import Camera
 from ..codecs import png_jpeg
 from ..codecs.display import Display
@@ -174,7 +174,7 @@ class Image:
         found: list[dict[str, Any]] = self.metadata[BOXES]
         return found
 
-    def mask(self, which: int | str, kind: str = "shape") -> NDArray[np.bool_]:
+    def mask(self, which: int | str, kind: str = "shape") -> Bools:
         """Return a mask (H, W): the pixels whose center ray meets an object, by its id or name.
 
         Parameters
@@ -243,7 +243,7 @@ class Image:
             self._error_absent(),
         )
 
-    def _region(self, region: Any, kind: str) -> NDArray[np.bool_]:
+    def _region(self, region: Any, kind: str) -> Bools:
         """Return the pixels (H, W) of a region, as `mean` takes it."""
         shape = self.rgb.shape[:2]
         if region is None:
@@ -268,7 +268,7 @@ class Image:
             raise SceneError("mean: the region has no pixel")
         return mask
 
-    def freedom(self) -> NDArray[np.float64]:
+    def freedom(self) -> Doubles:
         """Return the degrees of freedom (H, W) with which the standard error of each pixel is known."""
         shape = self.rgb.shape[:2]
         counts = np.full(shape, self.spp) if self.counts is None else self.counts

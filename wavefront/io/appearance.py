@@ -8,9 +8,8 @@ from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-from ..arrays.vec import f4
+from ..arrays.vec import Doubles, f4
 from ..bsdfs import Bsdf, Dielectric, Diffuse, Principled, ThinDielectric
 from ..colors import srgb_to_linear
 from ..materials import Material
@@ -32,7 +31,7 @@ class MaterialSpec:
     """The appearance of a surface in a file."""
 
     material: Material
-    emission: NDArray[np.float64] | Texture | None = None  # radiance, (3,) or varying
+    emission: Doubles | Texture | None = None  # radiance, (3,) or varying
     two_sided: bool = False  # the emission leaves both sides
     lost: list[str] = field(default_factory=list)  # properties that are not supported
     alpha: Any = None  # number or texture in glTF's alpha modes MASK and BLEND

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..arrays.elementary import log, sin_cos_turns
-from ..arrays.vec import FLOAT32_MAX
+from ..arrays.vec import FLOAT32_MAX, Doubles
 from ..codecs.images import decode_codes
 from ..core.errors import SceneError, printable
 from ..textures.image import Texture
@@ -192,9 +192,7 @@ class _Reader:
             raise SceneError(f"{self._file}: {self._where}.{key} is {value:g}; it must be in [0, {high:g}]")
         return float(value)
 
-    def _color(
-        self, group: dict[str, Any], key: str, default: list[float], high: float = 1.0
-    ) -> NDArray[np.float64]:
+    def _color(self, group: dict[str, Any], key: str, default: list[float], high: float = 1.0) -> Doubles:
         value = floats(f"{self._file}: {self._where}.{key}", group.get(key, default), len(default))
         if (value < 0).any() or (value > high).any():
             raise SceneError(
@@ -384,7 +382,7 @@ class _Reader:
             with np.errstate(over="ignore"):
                 self._wanted["absorption"] = -log(np.maximum(color, 1e-6).astype(np.float32)) / distance
 
-    def _emission(self, strength: dict[str, Any]) -> NDArray[np.float64] | Texture | None:
+    def _emission(self, strength: dict[str, Any]) -> Doubles | Texture | None:
         factor = self._color(self._item, "emissiveFactor", [0.0, 0.0, 0.0])
         factor = factor * self._number(strength, "emissiveStrength", 1.0, high=FLOAT32_MAX)
         if not factor.any():
@@ -408,7 +406,7 @@ def _wrap(sampler: dict[str, Any], key: str) -> Any:
     return WRAPS.get(sampler.get(key, 10497), "repeat")
 
 
-def _uv_matrix(document: Document, move: dict[str, Any], where: str) -> NDArray[np.float64]:
+def _uv_matrix(document: Document, move: dict[str, Any], where: str) -> Doubles:
     """Return KHR_texture_transform as a matrix for v upwards."""
     place = f"{document.name}: {where} KHR_texture_transform"
     offset = floats(place + " offset", move.get("offset", [0, 0]), 2)

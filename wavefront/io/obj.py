@@ -18,8 +18,8 @@ from itertools import pairwise
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ..arrays.vec import Ints
 from ..core.errors import SceneError
 from .repair import RawMesh, Table, warn
 from .sources import LoadLimits
@@ -257,7 +257,7 @@ def _raws(lines: _Lines, same: _Class, mesh: dict[str, Any]) -> Iterator[RawMesh
     uvs, begin = visual and visual.uv, 0
     for material, count in same.groups:
         faces, begin = mesh["faces"][begin : begin + count], begin + count
-        used: NDArray[np.intp] | slice = slice(None)
+        used: Ints | slice = slice(None)
         if len(same.groups) > 1:
             used, inverse = np.unique(faces, return_inverse=True)
             faces = inverse.reshape(faces.shape)

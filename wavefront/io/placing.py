@@ -5,8 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass, field, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ..arrays.vec import Bools, Ints
 from ..core.errors import SceneError
 from ..shapes import Instance, Mesh
 from ..shapes.instance import can_place
@@ -22,7 +22,7 @@ MAX_COPIED_FACES = 2**25  # triangles in copies of meshes, where each placement 
 class Places:
     """Placements of meshes, in the order of the scene's shapes."""
 
-    raw: NDArray[np.intp] = field(default_factory=lambda: np.zeros(0, np.intp))  # (n,) index of the mesh
+    raw: Ints = field(default_factory=lambda: np.zeros(0, np.intp))  # (n,) index of the mesh
     matrix: Matrix = field(default_factory=lambda: np.zeros((0, 4, 4)))  # (n, 4, 4) to the scene
     # (n,) of the placed shapes, "" for that of the mesh; None for all of these
     names: list[str] | None = None
@@ -103,7 +103,7 @@ def moved_raw(raw: RawMesh, matrix: Matrix) -> RawMesh:
     return replace(raw, vertices=vertices, faces=faces, normals=normals, tangents=tangents)
 
 
-def in_range(matrices: Matrix) -> NDArray[np.bool_]:
+def in_range(matrices: Matrix) -> Bools:
     """Return a mask (n,) of the matrices (n, 4, 4) whose elements are all in the supported range."""
     return np.asarray((np.abs(matrices) <= MAX_ELEMENT).all((1, 2)))
 
@@ -118,7 +118,7 @@ def _check_range(name: str, raws: list[RawMesh], places: Places) -> None:
         )
 
 
-def _by_mesh(raws: list[RawMesh], places: Places) -> list[tuple[RawMesh, NDArray[np.intp]]]:
+def _by_mesh(raws: list[RawMesh], places: Places) -> list[tuple[RawMesh, Ints]]:
     """Return each mesh that is placed, with the numbers of its placements in rising order."""
     order = np.argsort(places.raw, kind="stable")
     numbers, begins = np.unique(places.raw[order], return_index=True)

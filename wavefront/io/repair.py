@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..arrays.vec import FLOAT32_MAX, cross, spans
+from ..arrays.vec import FLOAT32_MAX, Bools, Doubles, Ints, cross, spans
 from ..core.errors import SceneError, printable, warn_caller
 from ..core.plural import plural
 from ..materials import Material
@@ -19,8 +19,8 @@ MAX_UV = 2.0**24  # above, float32 has no fractions, which textures need
 AT_ONCE = 1 << 14  # faces whose area is found together, so that they fit the cache
 FLAT = 1e-14  # a face is degenerate if twice its area is below this multiple of its longest edge squared
 
-Table = NDArray[np.float64]
-Faces = NDArray[np.intp]
+Table = Doubles
+Faces = Ints
 
 
 def warn(message: str, strict: bool) -> None:
@@ -99,7 +99,7 @@ def build(source: str, raw: RawMesh, strict: bool = False) -> Mesh | None:
     _check_indices(label, faces, len(vertices))
     sound = np.all(np.abs(vertices) <= FLOAT32_MAX, axis=1)  # false for NaN
     vertices = np.where(sound[:, None], vertices, 0.0)
-    keep: NDArray[np.bool_] = np.all(sound[faces], axis=1)
+    keep: Bools = np.all(sound[faces], axis=1)
     _report(label, raw, ~keep, "with a vertex that is not finite or beyond float32", strict)
     flat = keep & ~_has_area(vertices, faces)
     _report(label, raw, flat, "of zero area", strict)
@@ -133,7 +133,7 @@ def _check_indices(label: str, faces: Faces, count: int) -> None:
         raise SceneError(f"{label}: face {i} uses vertex {faces[i, j]}; it must be in [0, {count - 1}]")
 
 
-def _report(label: str, raw: RawMesh, bad: NDArray[np.bool_], what: str, strict: bool) -> None:
+def _report(label: str, raw: RawMesh, bad: Bools, what: str, strict: bool) -> None:
     found = np.flatnonzero(bad)
     if not len(found):
         return
@@ -149,7 +149,7 @@ def _warn_of_vertices(label: str, bad: Any, what: str, state: str, strict: bool)
     warn(f"{label}: {found} {state}, first: vertex {bad.argmax()}", strict)
 
 
-def _has_area(vertices: Table, faces: Faces) -> NDArray[np.bool_]:
+def _has_area(vertices: Table, faces: Faces) -> Bools:
     found = np.empty(len(faces), np.bool_)
     for part in spans(len(faces), AT_ONCE):
         a, b, c = np.ascontiguousarray(vertices.take(faces[part], 0).transpose(1, 2, 0))

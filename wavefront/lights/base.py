@@ -12,7 +12,7 @@ from abc import ABC, abstractmethod
 from typing import Any, ClassVar
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from ..arrays.soa import soa
 from ..arrays.state import SoA, SurfaceInteraction
@@ -97,7 +97,7 @@ class Light(ABC):
     hint: ClassVar[str | None] = None  # how to turn the light to what it misses, for messages
 
     @abstractmethod
-    def record(self, center: NDArray[np.float64]) -> LightRecord:
+    def record(self, center: Doubles) -> LightRecord:
         """Return the light as a record, with positions relative to `center` (3,).
 
         It has one column; that of a light with a `shape` may have one for each of its faces.
@@ -109,7 +109,7 @@ class Light(ABC):
         return self.record(np.zeros(3)).delta
 
     @property
-    def bounds(self) -> NDArray[np.float64] | None:
+    def bounds(self) -> Doubles | None:
         """Lower and upper corner (2, 3) of the light, scene units; None if it has no position."""
         return None
 
@@ -148,7 +148,7 @@ class LightRecord(SoA, Light):
     reads: ClassVar[tuple[str, ...]] = ()  # attributes of the surface that `le` reads, such as "uv"
     takes_receiver: ClassVar[bool] = False  # whether `lighting` is another light
 
-    def record(self, center: NDArray[np.float64]) -> LightRecord:
+    def record(self, center: Doubles) -> LightRecord:
         """Return the light relative to `center` (3,); a light that is its own record defines how."""
         raise SceneError(
             f"{type(self).__name__} has no record(center), which returns the light relative to the center"
@@ -170,7 +170,7 @@ class LightRecord(SoA, Light):
         """
 
     @abstractmethod
-    def power(self, scene_radius: float) -> NDArray[np.float64]:
+    def power(self, scene_radius: float) -> Doubles:
         """Estimate the emitted power of each light, (k,), the mean of the channels, W.
 
         A light without power gets no samples.
@@ -184,9 +184,7 @@ class LightRecord(SoA, Light):
         """
         return self
 
-    def irradiance(
-        self, center: NDArray[np.float64], radius: float, scene_radius: float
-    ) -> NDArray[np.float64]:
+    def irradiance(self, center: Doubles, radius: float, scene_radius: float) -> Doubles:
         """Estimate the irradiance by each light in spheres of space, W/m²; it guides the choice of a light.
 
         Parameters
@@ -236,7 +234,7 @@ class DeltaLight(LightRecord):
         return np.zeros_like(wi)
 
 
-def position(name: str, value: ArrayLike) -> NDArray[np.float64]:
+def position(name: str, value: ArrayLike) -> Doubles:
     """Return where a light stands, (3,) scene units."""
     return finite_array(name, value, (3,))
 

@@ -5,13 +5,13 @@ from __future__ import annotations
 from typing import Self
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from ..arrays.elementary import sin_cos
 from ..arrays.frame import Frame
 from ..arrays.soa import soa
 from ..arrays.state import SurfaceInteraction
-from ..arrays.vec import TWO_PI, Floats, column, dot, f4
+from ..arrays.vec import TWO_PI, Bools, Doubles, Floats, column, dot, f4
 from ..colors import rgb
 from ..core.errors import SceneError, finite_array, number
 from ..core.parameter import Parameter, Parametrized, parametrized
@@ -35,13 +35,11 @@ class DirectionalLights(DeltaLight):
         wi = np.broadcast_to(self.towards, point.shape)
         return at_infinity(wi, np.broadcast_to(self.facing, point.shape), np.ones(point.shape[1], f4))
 
-    def power(self, scene_radius: float) -> NDArray[np.float64]:
+    def power(self, scene_radius: float) -> Doubles:
         """E through the disk of the scene, πR²."""
         return through_scene(self.facing.mean(0, dtype=np.float64), scene_radius)
 
-    def irradiance(
-        self, center: NDArray[np.float64], radius: float, scene_radius: float
-    ) -> NDArray[np.float64]:
+    def irradiance(self, center: Doubles, radius: float, scene_radius: float) -> Doubles:
         """E, everywhere; (c, k)."""
         return facing_irradiance(self, center)
 
@@ -73,24 +71,22 @@ class SunLight(InfiniteLight):
         """Return the radiance within the disk, (3, n)."""
         return self.radiance * self._meets(wi)
 
-    def power(self, scene_radius: float) -> NDArray[np.float64]:
+    def power(self, scene_radius: float) -> Doubles:
         """π·sin²·L through the disk of the scene, πR²."""
         height = self.height.astype(np.float64)
         irradiance = np.pi * height * (2 - height) * self.radiance.mean(0, dtype=np.float64)
         return through_scene(irradiance, scene_radius)
 
-    def irradiance(
-        self, center: NDArray[np.float64], radius: float, scene_radius: float
-    ) -> NDArray[np.float64]:
+    def irradiance(self, center: Doubles, radius: float, scene_radius: float) -> Doubles:
         """E, everywhere; (c, k)."""
         return facing_irradiance(self, center)
 
-    def _meets(self, wi: Floats) -> NDArray[np.bool_]:
+    def _meets(self, wi: Floats) -> Bools:
         away = wi - column(self.axes[:, 2])
         return f4(0.5) * dot(away, away) <= self.height  # 1 − cosθ without cancellation
 
 
-def unit(name: str, value: ArrayLike) -> NDArray[np.float64]:
+def unit(name: str, value: ArrayLike) -> Doubles:
     """Return a (3,) direction scaled to unit length.
 
     Raises
@@ -149,7 +145,7 @@ class DirectionalLight(Parametrized, Light):
         """Return the light: it has no length."""
         return self
 
-    def record(self, center: NDArray[np.float64]) -> DirectionalLights | SunLight:
+    def record(self, center: Doubles) -> DirectionalLights | SunLight:
         """Return the light as a record of one column."""
         towards = (-self.direction).astype(f4).reshape(3, 1)
         if self.angle == 0:

@@ -8,11 +8,11 @@ from dataclasses import replace
 from typing import Literal, Self
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from ..arrays.soa import soa
 from ..arrays.state import SurfaceInteraction
-from ..arrays.vec import INV_FOUR_PI, Floats, f4
+from ..arrays.vec import INV_FOUR_PI, Doubles, Floats, f4
 from ..codecs.budget import in_memory
 from ..colors import is_color_name, rgb
 from ..core.errors import as_array, one_of, rotation_matrix
@@ -50,7 +50,7 @@ class ConstantEnvironment(InfiniteLight):
         """Return the radiance, (3, n)."""
         return np.broadcast_to(self.radiance, wi.shape)
 
-    def power(self, scene_radius: float) -> NDArray[np.float64]:
+    def power(self, scene_radius: float) -> Doubles:
         """4π·L through the disk of the scene, πR², what light samples are to bring of it."""
         return self.share * through_scene(4 * np.pi * self.radiance.mean(0, dtype=np.float64), scene_radius)
 
@@ -163,6 +163,6 @@ class Environment(Parametrized, Light):
         """Return the light: it has no length."""
         return self
 
-    def record(self, center: NDArray[np.float64]) -> InfiniteLight:
+    def record(self, center: Doubles) -> InfiniteLight:
         """Return the light as a record of one column."""
         return ConstantEnvironment(self.radiance) if self._image is None else self._image

@@ -7,11 +7,11 @@ from functools import lru_cache
 from itertools import pairwise
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from ..arrays.elementary import arccos, arcsin, arctan2, sin_cos
 from ..arrays.soa import soa
-from ..arrays.vec import FLOAT32_MAX, Doubles, Floats, Ints, dot, f4
+from ..arrays.vec import FLOAT32_MAX, Bools, Doubles, Floats, Ints, dot, f4
 from ..codecs.luminaires import Photometry, luminaire_texts, parsed_luminaire
 from ..colors import EFFICACY, from_photometric, to_photometric
 from ..core.errors import SceneError, number
@@ -60,7 +60,7 @@ class Web:
         return np.where(within_x & within_y, near * (f4(1) - x) + far * x, f4(0))
 
 
-def _place(angles: Floats, at: Floats) -> tuple[Ints, Floats, NDArray[np.bool_]]:
+def _place(angles: Floats, at: Floats) -> tuple[Ints, Floats, Bools]:
     """Return the cell (n,) between angles that each number is in, where in it, and whether it is in any."""
     cell = np.clip(np.searchsorted(angles, at, "right") - 1, 0, len(angles) - 2)
     low, high = angles.take(cell), angles.take(cell + 1)
@@ -102,13 +102,11 @@ class IESLights(DeltaLight):
         pdf = np.where(apart & (candela > 0), f4(1), f4(0))
         return LightSample(wi, self.intensity * (candela / safe), pdf, distance, np.ones_like(distance))
 
-    def power(self, scene_radius: float) -> NDArray[np.float64]:
+    def power(self, scene_radius: float) -> Doubles:
         """Return the integral of the intensity over all directions."""
         return self.intensity.mean(0, dtype=np.float64) * self.web.flux
 
-    def irradiance(
-        self, center: NDArray[np.float64], radius: float, scene_radius: float
-    ) -> NDArray[np.float64]:
+    def irradiance(self, center: Doubles, radius: float, scene_radius: float) -> Doubles:
         """I/d² at most, with the brightest direction between the polar angles of the ball; (c, k)."""
         away = center[:, :, None] - self.position[:, None, :]
         distance = np.sqrt((away**2).sum(0))
@@ -231,7 +229,7 @@ class IESLight(LightAtPoint):
         """Luminous flux, lm."""
         return self._web.flux * float(to_photometric(self.intensity[:, 0], efficacy=self.efficacy))
 
-    def record(self, center: NDArray[np.float64]) -> IESLights:
+    def record(self, center: Doubles) -> IESLights:
         """Return the light as a record of one column, relative to `center` (3,)."""
         down = self.direction.astype(f4).reshape(3, 1)
         right, x = sides_of(self.direction, self.c0)

@@ -8,12 +8,11 @@ from pathlib import Path
 from typing import Any, ClassVar, Self
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ..arrays.elementary import arctan2, sin_cos, sin_cos_turns
 from ..arrays.soa import soa
 from ..arrays.state import SurfaceInteraction
-from ..arrays.vec import INV_PI, INV_TWO_PI, Floats, Ints, f4, luminance
+from ..arrays.vec import INV_PI, INV_TWO_PI, Doubles, Floats, Ints, f4, luminance
 from ..codecs.budget import Budget
 from ..codecs.encoding import codes_to_linear
 from ..codecs.images import COLOR_BYTES, read_codes
@@ -40,8 +39,8 @@ class ImageEnvironment(InfiniteLight):
     image: Texture  # top row up, the middle column towards +z, columns turning from +x to -x
     texels: Distribution2D  # over columns and rows; uniform within a texel
     density: Floats  # (H,) 1/(2π·H·Δcosθ) of each row: density over the unit square -> 1/sr
-    top: NDArray[np.float64]  # (H,) cosθ of the upper edge of each row
-    step: NDArray[np.float64]  # (H,) Δcosθ from the upper edge of each row to the lower
+    top: Doubles  # (H,) cosθ of the upper edge of each row
+    step: Doubles  # (H,) Δcosθ from the upper edge of each row to the lower
     mean: Floats  # (3, 1) radiance, averaged over all directions
     rotation: Floats | None  # (3, 3) to world from environment; None where they are the same
     poles: bool = False  # the first and the last row of the image lie at the poles
@@ -52,9 +51,7 @@ class ImageEnvironment(InfiniteLight):
     takes_receiver: ClassVar[bool] = True
 
     @classmethod
-    def of(
-        cls, pixels: Floats, filter: str, rotation: NDArray[np.float64] | None, poles: bool = False
-    ) -> Self:
+    def of(cls, pixels: Floats, filter: str, rotation: Doubles | None, poles: bool = False) -> Self:
         """Prepare an image (H, W, 3), finite and at least 0, top row first.
 
         Raises
@@ -148,7 +145,7 @@ class ImageEnvironment(InfiniteLight):
         """Return the radiance of the image in direction wi, (3, n)."""
         return self._lookup(*self._place(wi))
 
-    def power(self, scene_radius: float) -> NDArray[np.float64]:
+    def power(self, scene_radius: float) -> Doubles:
         """4π times the mean radiance, through the disk of the scene, πR²; what light samples are to bring."""
         return self.share * through_scene(4 * np.pi * self.mean.mean(0, dtype=np.float64), scene_radius)
 
@@ -170,7 +167,7 @@ class ImageEnvironment(InfiniteLight):
         return self.image.lookup(np.stack([x, f4(1) - y]))
 
 
-def _spread(pixels: Floats, poles: bool) -> NDArray[np.float64]:
+def _spread(pixels: Floats, poles: bool) -> Doubles:
     """Mean of the bilinear lookup within each texel: its neighbors count ⅛, itself ¾, both ways.
 
     Half a texel at a pole has the weights of a whole one between equal rows. The mean is positive wherever

@@ -7,11 +7,10 @@ from dataclasses import replace
 from typing import ClassVar, Self
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ..arrays.soa import soa
 from ..arrays.state import SurfaceInteraction
-from ..arrays.vec import ALL, Floats, Lanes, column, f4
+from ..arrays.vec import ALL, Doubles, Floats, Lanes, column, f4
 from ..sampling.discrete import Discrete
 from .base import LightRecord, LightSample, Receiver, lit_for
 
@@ -27,7 +26,7 @@ class InfiniteLight(LightRecord):
 
     __slots__ = ()
 
-    def record(self, center: NDArray[np.float64]) -> Self:
+    def record(self, center: Doubles) -> Self:
         """Return the light: it is the same from everywhere."""
         return self
 
@@ -114,13 +113,11 @@ class EnvironmentSum(InfiniteLight):
             radiance += part.le(wi)
         return radiance
 
-    def power(self, scene_radius: float) -> NDArray[np.float64]:
+    def power(self, scene_radius: float) -> Doubles:
         """Return the sum of the parts' powers."""
         return np.sum([part.power(scene_radius) for part in self.parts], axis=0)
 
-    def irradiance(
-        self, center: NDArray[np.float64], radius: float, scene_radius: float
-    ) -> NDArray[np.float64]:
+    def irradiance(self, center: Doubles, radius: float, scene_radius: float) -> Doubles:
         """Return the sum of what the parts bring, (c, 1)."""
         return np.sum([part.irradiance(center, radius, scene_radius) for part in self.parts], axis=0)
 
@@ -136,12 +133,12 @@ def at_infinity(wi: Floats, radiance: Floats, pdf: Floats) -> LightSample:
     return LightSample(wi, radiance, pdf, np.full(n, np.inf, f4), np.ones(n, f4))
 
 
-def through_scene(irradiance: NDArray[np.float64], scene_radius: float) -> NDArray[np.float64]:
+def through_scene(irradiance: Doubles, scene_radius: float) -> Doubles:
     """Power of light with this `irradiance` (k,) through the disk that the scene covers, (k,)."""
     return np.pi * scene_radius**2 * irradiance
 
 
-def facing_irradiance(light: LightRecord, center: NDArray[np.float64]) -> NDArray[np.float64]:
+def facing_irradiance(light: LightRecord, center: Doubles) -> Doubles:
     """Return what lights from one direction bring to surfaces that face them, (c, k), at c places."""
     irradiance = light.power(1.0) / np.pi
     return np.broadcast_to(irradiance, (center.shape[1], len(irradiance)))

@@ -6,11 +6,10 @@ from dataclasses import field, replace
 from typing import ClassVar, Self
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ..arrays.soa import soa
 from ..arrays.state import SurfaceInteraction
-from ..arrays.vec import TINY, Floats, dot, f4, positive
+from ..arrays.vec import TINY, Doubles, Floats, dot, f4, positive
 from .base import Emitters, LightRecord, Receiver
 
 LEAST_SQUARE = f4(1e-35)  # added to squared distances before their root, so that nothing is divided by 0
@@ -41,9 +40,9 @@ class PlanarLights(LightRecord):
     @classmethod
     def from_edges(
         cls,
-        corner: NDArray[np.float64],
-        edge_u: NDArray[np.float64],
-        edge_v: NDArray[np.float64],
+        corner: Doubles,
+        edge_u: Doubles,
+        edge_v: Doubles,
         radiance: Floats,
     ) -> Self:
         """Build from corners, relative to the scene's center, edges, and radiance, (3, k) each or (3, 1)."""
@@ -57,13 +56,11 @@ class PlanarLights(LightRecord):
         """Return the radiance of rays that meet an emitting side, (3, n), else 0."""
         return self.radiance * (self._facing(-dot(self.normal, wi)) > 0)
 
-    def power(self, scene_radius: float) -> NDArray[np.float64]:
+    def power(self, scene_radius: float) -> Doubles:
         """π·A·L for each side."""
         return self.sides * np.pi * self.area * self.radiance.mean(0, dtype=np.float64)
 
-    def irradiance(
-        self, center: NDArray[np.float64], radius: float, scene_radius: float
-    ) -> NDArray[np.float64]:
+    def irradiance(self, center: Doubles, radius: float, scene_radius: float) -> Doubles:
         """L·A·cosθ/d² at most, with the area at the middle; (c, k)."""
         middle = self._middle()
         size = np.sqrt(self.area)

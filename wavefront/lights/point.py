@@ -6,10 +6,10 @@ from copy import copy
 from typing import Self
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from ..arrays.soa import soa
-from ..arrays.vec import FLOAT32_MAX, Floats, dot, f4
+from ..arrays.vec import FLOAT32_MAX, Doubles, Floats, dot, f4
 from ..colors import rgb
 from ..core.errors import SceneError, as_array, finite_array
 from ..core.parameter import Parameter, Parametrized, parametrized
@@ -34,13 +34,11 @@ class PointLightRecord(DeltaLight):
         pdf = np.where(lit, f4(1), f4(0))
         return LightSample(away / distance, self.intensity / safe, pdf, distance, np.ones_like(distance))
 
-    def power(self, scene_radius: float) -> NDArray[np.float64]:
+    def power(self, scene_radius: float) -> Doubles:
         """4πI."""
         return 4 * np.pi * self.intensity.mean(0, dtype=np.float64)
 
-    def irradiance(
-        self, center: NDArray[np.float64], radius: float, scene_radius: float
-    ) -> NDArray[np.float64]:
+    def irradiance(self, center: Doubles, radius: float, scene_radius: float) -> Doubles:
         """I/d², with d at least the radius of the ball; (c, k)."""
         away = self.position[:, None, :] - center[:, :, None]
         return self.intensity.mean(0, dtype=np.float64) / np.maximum((away**2).sum(0), radius**2)
@@ -51,7 +49,7 @@ class PointLightRecord(DeltaLight):
         return Emitters(middle, np.zeros_like(middle), np.zeros(len(self)))
 
 
-def intensity_of(name: str, value: ArrayLike) -> NDArray[np.float64]:
+def intensity_of(name: str, value: ArrayLike) -> Doubles:
     """Return an intensity as a (3, 1) float64 column: in a very large scene it may be beyond float32.
 
     Raises
@@ -72,7 +70,7 @@ class LightAtPoint(Parametrized, Light):
     group: Parameter[str] = Parameter(group_name, default=DEFAULT_GROUP, kw_only=True)
 
     @property
-    def bounds(self) -> NDArray[np.float64]:
+    def bounds(self) -> Doubles:
         """The position, twice, (2, 3)."""
         return np.stack([self.position, self.position])
 
@@ -112,12 +110,12 @@ class PointLight(LightAtPoint):
     >>> lamp = wf.PointLight((0, 3, 0), intensity=(40, 35, 30))
     """
 
-    def record(self, center: NDArray[np.float64]) -> PointLightRecord:
+    def record(self, center: Doubles) -> PointLightRecord:
         """Return the light as a record of one column, relative to `center` (3,)."""
         return PointLightRecord((self.position - center).astype(f4).reshape(3, 1), self.intensity.astype(f4))
 
 
-def checked_positions(name: str, value: ArrayLike) -> NDArray[np.float64]:
+def checked_positions(name: str, value: ArrayLike) -> Doubles:
     """Return where lights stand, (n, 3) scene units.
 
     Raises
@@ -131,7 +129,7 @@ def checked_positions(name: str, value: ArrayLike) -> NDArray[np.float64]:
     return array
 
 
-def intensities_of(name: str, value: ArrayLike) -> NDArray[np.float64]:
+def intensities_of(name: str, value: ArrayLike) -> Doubles:
     """Return intensities as float64: in a very large scene they may be beyond float32.
 
     Raises
@@ -192,7 +190,7 @@ class PointLights(Parametrized, Light):
             )
 
     @property
-    def bounds(self) -> NDArray[np.float64]:
+    def bounds(self) -> Doubles:
         """Lower and upper corner (2, 3) of the positions."""
         return np.stack([self.positions.min(0), self.positions.max(0)])
 
@@ -209,7 +207,7 @@ class PointLights(Parametrized, Light):
         lights.intensities = scaled_intensity("PointLights intensities", self.intensities, factor)
         return lights
 
-    def record(self, center: NDArray[np.float64]) -> PointLightRecord:
+    def record(self, center: Doubles) -> PointLightRecord:
         """Return the lights as a record of n columns, relative to `center` (3,)."""
         intensities = np.broadcast_to(self.intensities, self.positions.shape)
         return PointLightRecord(
@@ -217,7 +215,7 @@ class PointLights(Parametrized, Light):
         )
 
 
-def scaled_intensity(name: str, intensity: NDArray[np.float64], factor: float) -> NDArray[np.float64]:
+def scaled_intensity(name: str, intensity: Doubles, factor: float) -> Doubles:
     """Return intensities in a scene whose lengths were multiplied by `factor`.
 
     Raises

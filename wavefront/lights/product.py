@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ..arrays.elementary import sin_cos_turns
-from ..arrays.vec import Floats, Ints, f4
+from ..arrays.vec import Doubles, Floats, Ints, f4
 from ..sampling.discrete import Inversion, within_cell
 
 NORMALS = 16  # squared: the normals of the table, on an octahedron
@@ -33,7 +32,7 @@ class CosineProduct:
         (3, 3) to world from the image; None where they are the same.
     """
 
-    def __init__(self, light: NDArray[np.float64], rotation: Floats | None) -> None:
+    def __init__(self, light: Doubles, rotation: Floats | None) -> None:
         self.shape = height, width = light.shape
         light = light / light.sum()
         rows, columns = min(CELLS[0], height), min(CELLS[1], width)
@@ -48,7 +47,7 @@ class CosineProduct:
         self._choose_cells(mass, middle)
         self._choose_texels(light, mass)
 
-    def _cell_light(self, light: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    def _cell_light(self, light: Doubles) -> tuple[Doubles, Doubles]:
         """Return the light of cells (rows, columns), and their mean directions (3, rows, columns)."""
         height, width = self.shape
         sin_theta, cos_theta = sin_cos_turns((np.arange(height) + 0.5) / (2 * height))
@@ -67,7 +66,7 @@ class CosineProduct:
                 out[row] = np.add.reduceat(part, self._column_edges[:-1])
         return mass, np.divide(middle, mass, out=np.zeros_like(middle), where=mass > 0)
 
-    def _choose_cells(self, mass: NDArray[np.float64], middle: NDArray[np.float64]) -> None:
+    def _choose_cells(self, mass: Doubles, middle: Doubles) -> None:
         x, y, z = octahedral_normals()[:, :, None, None]
         cos = x * middle[0] + y * middle[1] + z * middle[2]  # (normals, rows, columns)
         weight = mass * np.maximum((cos + MARGIN) / (1 + MARGIN), 0)
@@ -81,7 +80,7 @@ class CosineProduct:
         self._columns = Inversion(columns.reshape(-1, self._cells[1]), 1)
         self._chance = weight.astype(f4).ravel()
 
-    def _choose_texels(self, light: NDArray[np.float64], mass: NDArray[np.float64]) -> None:
+    def _choose_texels(self, light: Doubles, mass: Doubles) -> None:
         height, width = self.shape
         rows, columns = self._cells
         of_row = np.add.reduceat(light, self._column_edges[:-1], axis=1)  # (H, columns)
@@ -131,13 +130,13 @@ class CosineProduct:
         return self._chance.take(cell) * self._density.take(row * width + column)
 
 
-def _rows_of_one(weights: NDArray[np.float64]) -> NDArray[np.float64]:
+def _rows_of_one(weights: Doubles) -> Doubles:
     """Return rows that each sum to 1, or are all 0."""
     total = weights.sum(1, keepdims=True)
     return np.divide(weights, total, out=weights, where=total > 0)
 
 
-def octahedral_normals() -> NDArray[np.float64]:
+def octahedral_normals() -> Doubles:
     """Return unit vectors (3, NORMALS²) at the middles of bins on an octahedron."""
     middle = (np.arange(NORMALS) + 0.5) / NORMALS * 2 - 1
     x, y = (each.ravel() for each in np.meshgrid(middle, middle, indexing="ij"))

@@ -5,10 +5,10 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from ..arrays.elementary import sin_cos
-from ..arrays.vec import f4
+from ..arrays.vec import Doubles, f4
 from ..core.errors import SceneError, number
 from ..core.parameter import Parameter
 from ..core.suggestions import suggests_keywords
@@ -83,7 +83,7 @@ class Projector(LightAtPoint):
         self.up = up
         self.group = group
 
-    def record(self, center: NDArray[np.float64]) -> PicturedLights:
+    def record(self, center: Doubles) -> PicturedLights:
         """Return the light as a record of one column, relative to `center` (3,)."""
         sin, cos = sin_cos(np.float64(np.radians(self.fov) / 2))
         high = sin / cos

@@ -6,10 +6,9 @@ from collections.abc import Iterator
 from typing import ClassVar, Self
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ..arrays.soa import soa
-from ..arrays.vec import Floats, Ints, dot, f4, put, take
+from ..arrays.vec import Doubles, Floats, Ints, dot, f4, put, take
 from ..sampling.spherical import SphericalRectangle
 from ..sampling.warp import linear_pdf, linear_with_density
 from ..shapes.fans import are_fans, disjoint_pairs
@@ -32,7 +31,7 @@ class RectangleLights(PlanarLights):
     middle: ClassVar[int] = 2
 
     @classmethod
-    def from_pairs(cls, triangles: NDArray[np.float64], radiance: Floats) -> Self:
+    def from_pairs(cls, triangles: Doubles, radiance: Floats) -> Self:
         """Build from the first triangle of each pair, (k, 3, 3), and radiance (3, k) or (3, 1).
 
         The corners of a pair are p, p + u, p + u + v and p, p + u + v, p + v.
@@ -134,7 +133,7 @@ class TwoSidedRectangleLights(TwoSided, RectangleLights):
     """k rectangles that emit from both sides."""
 
 
-def first_of_pairs(triangles: NDArray[np.float64], mesh_of: Ints) -> Ints:
+def first_of_pairs(triangles: Doubles, mesh_of: Ints) -> Ints:
     """Find consecutive triangles (m, 3, 3) that make a rectangle: indices (k,) of the first of each.
 
     `mesh_of` (m,) numbers their meshes; both must be of the same.

@@ -6,7 +6,7 @@ from dataclasses import replace
 from typing import ClassVar, Self
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from ..arrays.elementary import arcsin, sin_cos_turns
 from ..arrays.frame import Frame
@@ -65,7 +65,7 @@ class SkyLight(InfiniteLight):
         above = self.scale * relative_radiance(self.function, wi, np.maximum(height, f4(0)), self.sun)
         return np.where(height >= 0, above, self.ground)
 
-    def power(self, scene_radius: float) -> NDArray[np.float64]:
+    def power(self, scene_radius: float) -> Doubles:
         """4π times the mean radiance, through the disk of the scene; what light samples are to bring."""
         return self.table.power(scene_radius)
 
@@ -347,7 +347,7 @@ class Sky(Parametrized, Light):
         """Return the light: it has no length."""
         return self
 
-    def record(self, center: NDArray[np.float64]) -> InfiniteLight:
+    def record(self, center: Doubles) -> InfiniteLight:
         """Return the sky, and the sun in it, as a record of one column."""
         if not self.direct_normal.any():
             return self._light
@@ -356,7 +356,7 @@ class Sky(Parametrized, Light):
         return EnvironmentSum.of([self._light, disk])
 
 
-def _zenith(up: ArrayLike) -> NDArray[np.float64]:
+def _zenith(up: ArrayLike) -> Doubles:
     return unit("Sky up", upward("Sky up", up))
 
 
@@ -368,13 +368,13 @@ def _height(sun: ArrayLike | None, up: ArrayLike) -> float:
     return min(height, 1.0)
 
 
-def _rotation(up: NDArray[np.float64]) -> NDArray[np.float64]:
+def _rotation(up: Doubles) -> Doubles:
     """Return the axes of the table, columns of (3, 3), of which the second is up."""
     frame = Frame.from_normal(column(up))
     return np.concatenate([frame.y, frame.z, frame.x], axis=1).astype(float)
 
 
-def _table(function: SkyFunction, rotation: NDArray[np.float64], sun: NDArray[np.float64]) -> Floats:
+def _table(function: SkyFunction, rotation: Doubles, sun: Doubles) -> Floats:
     """Return the function (k, rows, COLUMNS) at the middles of the texels above the horizon."""
     rows = ROWS // 2
     level, high = sin_cos_turns((np.arange(rows) + 0.5) / (2 * ROWS))

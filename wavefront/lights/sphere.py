@@ -7,13 +7,25 @@ from dataclasses import field, replace
 from typing import ClassVar, Self
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ..arrays.elementary import sin_cos_turns
 from ..arrays.frame import Frame
 from ..arrays.soa import soa
 from ..arrays.state import SurfaceInteraction
-from ..arrays.vec import INV_FOUR_PI, INV_PI, TWO_PI, Bools, Floats, Ints, dot, f4, positive, put, take
+from ..arrays.vec import (
+    INV_FOUR_PI,
+    INV_PI,
+    TWO_PI,
+    Bools,
+    Doubles,
+    Floats,
+    Ints,
+    dot,
+    f4,
+    positive,
+    put,
+    take,
+)
 from ..sampling.warp import uniform_cone, uniform_sphere
 from .base import Emitters, LightRecord, LightSample, Receiver
 
@@ -100,13 +112,11 @@ class SphereLights(LightRecord):
         """Return the radiance, (3, n)."""
         return np.broadcast_to(self.radiance, wi.shape)
 
-    def power(self, scene_radius: float) -> NDArray[np.float64]:
+    def power(self, scene_radius: float) -> Doubles:
         """4πr²·π·L of the outside."""
         return 4 * np.pi**2 * self.radius.astype(np.float64) ** 2 * self.radiance.mean(0, dtype=np.float64)
 
-    def irradiance(
-        self, center: NDArray[np.float64], radius: float, scene_radius: float
-    ) -> NDArray[np.float64]:
+    def irradiance(self, center: Doubles, radius: float, scene_radius: float) -> Doubles:
         """π·L·(r/d)², with d at least r and the radius of the ball; (c, k)."""
         away = self.center[:, None, :] - center[:, :, None]
         size = self.radius.astype(np.float64)

@@ -6,11 +6,11 @@ from functools import partial
 from typing import Any, Literal
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from ..arrays.elementary import arccos, arcsin, sin_cos, sin_cos_turns
 from ..arrays.soa import soa
-from ..arrays.vec import Floats, dot, f4, highest
+from ..arrays.vec import Doubles, Floats, dot, f4, highest
 from ..core.errors import SceneError, finite_array, number, one_of
 from ..core.parameter import Parameter
 from ..core.suggestions import suggests_keywords
@@ -46,7 +46,7 @@ class SpotLights(DeltaLight):
         pdf = np.where(apart & (strength > 0), f4(1), f4(0))
         return LightSample(wi, self.intensity * (strength / safe), pdf, distance, np.ones_like(distance))
 
-    def power(self, scene_radius: float) -> NDArray[np.float64]:
+    def power(self, scene_radius: float) -> Doubles:
         """2πI·(h_inner + (h_outer − h_inner)/3), the integral of the falloff; h = 1 − cos.
 
         Of a linear one 2πI·(1 − (sin outer − sin inner)/(outer − inner)).
@@ -60,9 +60,7 @@ class SpotLights(DeltaLight):
         solid_angle = np.where(linear > 0, 2 * np.pi * (1 - rise), solid_angle)
         return solid_angle * self.intensity.mean(0, dtype=np.float64)
 
-    def irradiance(
-        self, center: NDArray[np.float64], radius: float, scene_radius: float
-    ) -> NDArray[np.float64]:
+    def irradiance(self, center: Doubles, radius: float, scene_radius: float) -> Doubles:
         """I·falloff/d² at most, with the falloff at the part of the ball nearest to the axis; (c, k)."""
         away = center[:, :, None] - self.position[:, None, :]
         distance = np.sqrt((away**2).sum(0))
@@ -121,7 +119,7 @@ class PicturedLights(SpotLights):
         sample.pdf = np.where(lit, sample.pdf, f4(0))
         return sample
 
-    def power(self, scene_radius: float) -> NDArray[np.float64]:
+    def power(self, scene_radius: float) -> Doubles:
         """Return the mean of the picture times the power of a spot, or I times the area of a screen."""
         mean = float(self.picture.mean().mean())
         if not self.screen:
@@ -129,9 +127,7 @@ class PicturedLights(SpotLights):
         area = 4 / np.sqrt((self.right**2).sum(0) * (self.up**2).sum(0))
         return self.intensity.mean(0, dtype=np.float64) * area * mean
 
-    def irradiance(
-        self, center: NDArray[np.float64], radius: float, scene_radius: float
-    ) -> NDArray[np.float64]:
+    def irradiance(self, center: Doubles, radius: float, scene_radius: float) -> Doubles:
         """Return that of the spot with the brightest color of the picture, to the corner of a screen."""
         most = max(self.picture.limits())
         if self.screen:
@@ -169,7 +165,7 @@ def aim(name: str, position: Any, target: ArrayLike | None, direction: ArrayLike
     return toward
 
 
-def sides_of(axis: NDArray[np.float64], up: NDArray[np.float64]) -> tuple[Floats, Floats]:
+def sides_of(axis: Doubles, up: Doubles) -> tuple[Floats, Floats]:
     """Return unit vectors (3, 1) to the right and up, seen along an axis (3,); any where up is parallel."""
     right = np.cross(axis, up)
     if np.linalg.norm(right) < 1e-9:
@@ -258,7 +254,7 @@ class SpotLight(LightAtPoint):
         self.up = up
         self.group = group
 
-    def record(self, center: NDArray[np.float64]) -> SpotLights:
+    def record(self, center: Doubles) -> SpotLights:
         """Return the light as a record of one column, relative to `center` (3,)."""
         half = np.radians(self.angle) / 2
         outer = 2 * sin_cos(np.float64(half / 2))[0] ** 2

@@ -5,10 +5,10 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Sequence
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from ..arrays.state import SurfaceInteraction
-from ..arrays.vec import ALL, Floats, Ints, Lanes, f4, put, take
+from ..arrays.vec import ALL, Doubles, Floats, Ints, Lanes, f4, put, take
 from ..sampling.mis import power_heuristic
 from .base import Emitters, LightRecord, LightSample, Receiver, emitters_of, lit_for, sampled_li
 from .choice import LightSampler, LightSamplerMaker
@@ -21,7 +21,7 @@ class IrradianceOf:
     def __init__(self, kinds: Sequence[LightRecord], scene_radius: float) -> None:
         self.kinds, self.scene_radius = kinds, scene_radius
 
-    def __call__(self, center: NDArray[np.float64], radius: float, /) -> NDArray[np.float64]:
+    def __call__(self, center: Doubles, radius: float, /) -> Doubles:
         """Return a bound on the irradiance (c, k) by each light within `radius` of points `center` (3, c)."""
         return np.concatenate([kind.irradiance(center, radius, self.scene_radius) for kind in self.kinds], 1)
 
@@ -76,7 +76,7 @@ class LightTable:
         return int(self.starts[-1])
 
     def _make_choice(
-        self, power: NDArray[np.float64], half_size: NDArray[np.float64], choice: str | LightSamplerMaker
+        self, power: Doubles, half_size: Doubles, choice: str | LightSamplerMaker
     ) -> LightSampler | None:
         """Return the light sampler; None when nothing shines. Lights without a power take no part."""
         make = LIGHT_SAMPLERS.find(choice)

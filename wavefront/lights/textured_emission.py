@@ -5,11 +5,10 @@ from __future__ import annotations
 from typing import Self
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ..arrays.soa import soa
 from ..arrays.state import SurfaceInteraction
-from ..arrays.vec import Bools, Floats, Ints, cross, f4, interpolate, normalize
+from ..arrays.vec import Bools, Doubles, Floats, Ints, cross, f4, interpolate, normalize
 from ..materials.alpha import Opacity
 from ..shapes import Mesh
 from ..shapes.attributes import Corners, corner_values
@@ -36,7 +35,7 @@ class TexturedTriangleLights(TriangleLights):
     @classmethod
     def textured(
         cls,
-        triangles: NDArray[np.float64],
+        triangles: Doubles,
         radiance: Floats,
         prim: Ints,
         source: Ints,
@@ -110,7 +109,7 @@ def has_textured_emission(mesh: Mesh) -> bool:
     return isinstance(mesh.emission, BaseTexture) or mesh.material.opacity is not None
 
 
-def mean_radiance(mesh: Mesh, triangles: NDArray[np.float64]) -> Floats:
+def mean_radiance(mesh: Mesh, triangles: Doubles) -> Floats:
     """Estimate the mean radiance of each face of an emitting mesh, (3, m).
 
     The emission of a face is evaluated at the centers of 16 to 1024 congruent triangles.
@@ -158,7 +157,7 @@ def _middles(steps: int) -> tuple[Floats, Floats]:
     return b1.astype(f4), b2.astype(f4)
 
 
-def _points(triangles: NDArray[np.float64], b1: Floats, b2: Floats) -> SurfaceInteraction:
+def _points(triangles: Doubles, b1: Floats, b2: Floats) -> SurfaceInteraction:
     """Return points with weights b1, b2 (k,) on triangles (m, 3, 3), seen head on: m·k columns."""
     a, b, c = np.ascontiguousarray(triangles.transpose(1, 2, 0), f4)
     normal = np.repeat(normalize(cross(b - a, c - a)), len(b1), 1)

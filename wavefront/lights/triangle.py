@@ -5,10 +5,9 @@ from __future__ import annotations
 from typing import ClassVar, Self
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ..arrays.soa import soa
-from ..arrays.vec import Floats, cross, dot, f4
+from ..arrays.vec import Doubles, Floats, cross, dot, f4
 from ..sampling.warp import linear_pdf, linear_with_density, uniform_triangle, uniform_triangle_inverse
 from .base import LightSample
 from .planar import LEAST_SQUARE, PlanarLights, TwoSided, area_pdf
@@ -25,7 +24,7 @@ class TriangleLights(PlanarLights):
     middle: ClassVar[int] = 3
 
     @classmethod
-    def from_triangles(cls, triangles: NDArray[np.float64], radiance: Floats) -> Self:
+    def from_triangles(cls, triangles: Doubles, radiance: Floats) -> Self:
         """Build from vertices (k, 3, 3), relative to the scene's center, and radiance (3, k) or (3, 1)."""
         a, b, c = triangles.transpose(1, 2, 0)
         found = cls.from_edges(a, b - a, c - a, radiance)

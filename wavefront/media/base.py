@@ -18,11 +18,10 @@ from abc import ABC, abstractmethod
 from typing import Any, ClassVar, Self
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ..arrays.soa import soa
 from ..arrays.state import SoA
-from ..arrays.vec import Floats, Ints, f4
+from ..arrays.vec import Doubles, Floats, Ints, f4
 from ..core.parameter import Parametrized
 from ..sampling.steps import StepNumbers
 from .phase import PhaseFunction
@@ -50,12 +49,12 @@ class BaseMedium(Parametrized, ABC):
     glows: bool  # likewise for emission
 
     @property
-    def bounds(self) -> NDArray[np.float64] | None:
+    def bounds(self) -> Doubles | None:
         """Corners of the box that it is in, (2, 3), scene units; here: None, as it may be anywhere."""
         return None
 
     @abstractmethod
-    def record(self, center: NDArray[np.float64]) -> MediumRecord:
+    def record(self, center: Doubles) -> MediumRecord:
         """Return the medium as a record of one column, with positions relative to `center` (3,)."""
 
     @abstractmethod

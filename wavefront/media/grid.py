@@ -6,11 +6,11 @@ from copy import copy
 from typing import Any, Self
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from ..arrays.elementary import exp
 from ..arrays.soa import soa
-from ..arrays.vec import FLOAT32_MAX, TINY, Doubles, Floats, Ints, dot, f4, highest, take
+from ..arrays.vec import FLOAT32_MAX, TINY, Bools, Doubles, Floats, Ints, dot, f4, highest, take
 from ..colors.spectrum import blackbody_colors
 from ..core.errors import SceneError, as_array, finite_array, number
 from ..core.parameter import Parameter, parametrized
@@ -186,7 +186,7 @@ class GridMedium(BaseMedium):
         corners = np.indices((2, 2, 2)).reshape(3, 8).T @ self.transform[:3, :3].T + self.transform[:3, 3]
         return np.stack([corners.min(0), corners.max(0)])
 
-    def record(self, center: NDArray[np.float64]) -> GridMedia:
+    def record(self, center: Doubles) -> GridMedia:
         """Return the medium as a record of one column, with positions relative to `center` (3,)."""
         inverse = np.linalg.inv(self.transform)
         offset = inverse[:3, :3] @ center + inverse[:3, 3]
@@ -261,8 +261,8 @@ class GridMedia(MediumRecord):
     extinction: Floats  # (3, k) where the density is 1, per scene unit
     scattering: Floats  # (3, k)
     shine: Floats  # (3, k) emission
-    scatters: NDArray[np.bool_]  # (k,)
-    glows: NDArray[np.bool_]  # (k,)
+    scatters: Bools  # (k,)
+    glows: Bools  # (k,)
 
     def sample(
         self,

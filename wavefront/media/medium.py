@@ -6,11 +6,11 @@ from copy import copy
 from typing import Any, Self
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from ..arrays.elementary import exp, log
 from ..arrays.soa import soa
-from ..arrays.vec import FLOAT32_MAX, Floats, Ints, f4, highest, take
+from ..arrays.vec import FLOAT32_MAX, Doubles, Floats, Ints, f4, highest, take
 from ..colors import rgb
 from ..core.errors import SceneError, number
 from ..core.parameter import Parameter, parametrized
@@ -113,7 +113,7 @@ class Medium(BaseMedium):
         )
         self.scatters, self.glows = bool(self.sigma_s.any()), bool(self.glow.any())
 
-    def record(self, center: NDArray[np.float64]) -> HomogeneousMedia:
+    def record(self, center: Doubles) -> HomogeneousMedia:
         """Return the medium as a record; it is the same everywhere."""
         return HomogeneousMedia(self.sigma_a + self.sigma_s, self.sigma_s, self.glow)
 

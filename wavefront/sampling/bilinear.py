@@ -11,7 +11,7 @@ from typing import TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
-from ..arrays.vec import Floats, Ints, f4
+from ..arrays.vec import Doubles, Floats, Ints, f4
 from ..core.errors import SceneError
 
 Mix: TypeAlias = Sequence[tuple[Ints, Floats]]  # slices (n,) and their weights (n,), which sum to 1
@@ -134,7 +134,7 @@ class BilinearDensity:
         return np.stack([across, along]), left + (right - left) * x
 
 
-def _sums(values: NDArray[np.float64]) -> NDArray[np.float64]:
+def _sums(values: Doubles) -> Doubles:
     """Return the integrals along the last axis, of length 1, up to each node."""
     out = np.zeros_like(values)
     np.cumsum(

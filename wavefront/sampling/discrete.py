@@ -8,14 +8,14 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ..arrays.vec import BELOW_ONE, Floats, Ints, f4
+from ..arrays.vec import BELOW_ONE, Doubles, Floats, Ints, f4
 from ..core.errors import SceneError
 from ..core.plural import plural
 
 _LARGE = 1 << 19  # tables of more items get fewer cells per item, to save memory
 
 
-def _checked(name: str, weights: ArrayLike, ndim: int) -> NDArray[np.float64]:
+def _checked(name: str, weights: ArrayLike, ndim: int) -> Doubles:
     """Return weights as float64, or raise SceneError naming the first that is out of range."""
     array = np.asarray(weights, np.float64)
     if array.ndim != ndim or not array.size:
@@ -48,7 +48,7 @@ class Inversion:
         Cells of the guide table for each item; by default 8, and 1 in large tables.
     """
 
-    def __init__(self, probability: NDArray[np.float64], cells_per_item: int | None = None) -> None:
+    def __init__(self, probability: Doubles, cells_per_item: int | None = None) -> None:
         rows, self.items = probability.shape
         items = self.items
         self._probability = probability.ravel().astype(f4)
@@ -96,7 +96,7 @@ class Inversion:
         return high
 
 
-def rounded_up(x: NDArray[np.float64]) -> Floats:
+def rounded_up(x: Doubles) -> Floats:
     """Return the smallest float32 that is not below x, at most 1."""
     near = np.minimum(x, 1).astype(f4)
     np.nextafter(near, f4(2), out=near, where=near < x)
@@ -125,7 +125,7 @@ class Discrete:
     def __init__(self, weights: ArrayLike) -> None:
         array = _checked("weights", weights, 1)
         array = array / array.max()  # against overflow and underflow of the sum
-        self.probability: NDArray[np.float64] = array / array.sum()
+        self.probability: Doubles = array / array.sum()
         self._inversion = Inversion(self.probability[None])
         self._pmf = self.probability.astype(f4)
 
@@ -192,7 +192,7 @@ class Distribution2D:
         y = within_cell(row, rest_y, height)
         return x, y, self._density.take(flat)
 
-    def weights(self) -> NDArray[np.float64]:
+    def weights(self) -> Doubles:
         """Return the density of each cell over the unit square, (rows, columns); their mean is 1."""
         return self._density.reshape(self.shape).astype(np.float64)
 

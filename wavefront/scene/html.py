@@ -6,9 +6,7 @@ from collections.abc import Sequence
 from html import escape
 from typing import Any
 
-import numpy as np
-from numpy.typing import NDArray
-
+from ..arrays.vec import Doubles
 from ..camera import Camera
 from ..core.html import table_html
 from ..core.parameter import brief
@@ -21,7 +19,7 @@ def scene_html(
     shapes: Sequence[Shape],
     lights: Sequence[Light],
     camera: Camera | None,
-    bounds: NDArray[np.float64] | None,
+    bounds: Doubles | None,
 ) -> str:
     """Return a scene as HTML.
 

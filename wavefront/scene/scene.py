@@ -8,10 +8,11 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import Any, ClassVar, Self, SupportsIndex, TypeAlias, TypeVar
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from ..accel import AcceleratorCache
 from ..arrays.elementary import sin_cos
+from ..arrays.vec import Doubles
 from ..camera import Camera, check_camera, field_of_view, image_size, upward
 from ..camera.framing import FILL, Balls, fitting_offset, turned_balls
 from ..core.errors import SceneError, finite_array, in_brief
@@ -142,7 +143,7 @@ class Scene:
         self._camera = check_camera("camera", camera)
 
     @property
-    def up(self) -> NDArray[np.float64] | None:
+    def up(self) -> Doubles | None:
         """The up direction, (3,) of any length; None means y."""
         return self._up
 
@@ -161,7 +162,7 @@ class Scene:
             raise SceneError(f"medium must be a Medium such as wf.Medium(scattering=0.1), got {medium!r}")
         self._medium = medium
 
-    def vertical(self, up: ArrayLike = AUTO) -> NDArray[np.float64]:
+    def vertical(self, up: ArrayLike = AUTO) -> Doubles:
         """Return the up direction (3,), of any length, given a vector, the name of an axis, or "auto"."""
         if isinstance(up, str) and up == AUTO:
             return upward("up", "y") if self.up is None else self.up
@@ -198,7 +199,7 @@ class Scene:
                 shape.check()
 
     @property
-    def bounds(self) -> NDArray[np.float64]:
+    def bounds(self) -> Doubles:
         """Lower and upper corner of all shapes, (2, 3), scene units."""
         instances = [shape for shape in self.shapes if isinstance(shape, Instance)]
         alone = [shape.bounds for shape in self.shapes if not isinstance(shape, Instance)]
@@ -280,7 +281,7 @@ class Scene:
         )
 
 
-def view_direction(name: str, view: ArrayLike) -> NDArray[np.float64]:
+def view_direction(name: str, view: ArrayLike) -> Doubles:
     """Return the unit direction (3,) of a view, from its name, where y is up, or from a vector.
 
     Raises
@@ -437,7 +438,7 @@ def _check_environments(lights: Sequence[Light]) -> None:
         raise SceneError("the scene has more than one Environment; at most one is allowed")
 
 
-def turned_up(up: NDArray[np.float64]) -> NDArray[np.float64]:
+def turned_up(up: Doubles) -> Doubles:
     """Return the shortest rotation (3, 3) that takes +y to the direction of `up` (3,)."""
     up = up / np.abs(up).max()
     up = up / np.linalg.norm(up)

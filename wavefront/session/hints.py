@@ -7,9 +7,9 @@ from collections.abc import Iterator
 from contextlib import suppress
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ..accel.embree import installed
+from ..arrays.vec import Doubles
 from ..film.film import MUCH_RARE
 from ..image import Image
 from ..lights import InfiniteLight
@@ -68,7 +68,7 @@ def caustics_hint(settings: Settings, prepared: PreparedScene) -> str | None:
     return RARE_CAUSTICS if lit_by_small_lamps(specular, IrradianceOf(kinds, 1.0)) else None
 
 
-def specular_boxes(scene: Scene) -> NDArray[np.float64]:
+def specular_boxes(scene: Scene) -> Doubles:
     """Return the lower and upper corner (n, 2, 3) of each shape of smooth glass or mirror, scene units."""
     boxes = [
         shape.bounds
@@ -78,7 +78,7 @@ def specular_boxes(scene: Scene) -> NDArray[np.float64]:
     return np.array(boxes, np.float64).reshape(-1, 2, 3)
 
 
-def lit_by_small_lamps(boxes: NDArray[np.float64], lights: IrradianceOf) -> bool:
+def lit_by_small_lamps(boxes: Doubles, lights: IrradianceOf) -> bool:
     """Return whether much of the light at the middle of some box (n, 2, 3) comes from small lamps."""
     if not lights.kinds or not len(boxes):
         return False

@@ -12,10 +12,8 @@ from functools import partial
 from types import TracebackType
 from typing import Any, Self, Unpack
 
-import numpy as np
-from numpy.typing import NDArray
-
 from ..aovs.boxes import silhouettes
+from ..arrays.vec import Bools
 from ..camera import Camera, check_camera, image_size
 from ..core.errors import RenderError, SaveError, SceneError, warn_caller
 from ..core.interrupt import InterruptHandler
@@ -369,7 +367,7 @@ class Session:
         """
         return self._render.identity()
 
-    def silhouettes(self, camera: Camera | None = None) -> Iterator[tuple[int, NDArray[np.bool_]]]:
+    def silhouettes(self, camera: Camera | None = None) -> Iterator[tuple[int, Bools]]:
         """Yield the id of each shape and the pixels (height, width) that it would cover if it were alone.
 
         Ids and rays are those of the AOV `shape_id`. Shapes that would cover no pixel are left out.

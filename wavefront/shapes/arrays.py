@@ -6,9 +6,9 @@ from copy import copy
 from typing import Any, ClassVar, Self
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
-from ..arrays.vec import FLOAT32_MAX
+from ..arrays.vec import FLOAT32_MAX, Doubles
 from ..core.errors import SceneError, as_array, finite_array
 from ..materials import MaterialLike
 from .base import Checked, CurvedShape
@@ -17,7 +17,7 @@ from .mesh import FLOAT32_MIN
 from .transform import points_by, similarities
 
 
-def _radii(name: str, value: ArrayLike) -> NDArray[np.float64]:
+def _radii(name: str, value: ArrayLike) -> Doubles:
     """Return radii (n,), or (1,) for a single number."""
     single = as_array(name, value).ndim == 0
     radii = finite_array(name, value, () if single else (None,)).reshape(-1)

@@ -12,10 +12,9 @@ from dataclasses import dataclass
 from typing import Protocol, TypeAlias
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ..arrays.elementary import arccos, arctan2
-from ..arrays.vec import Floats, Ints, f4
+from ..arrays.vec import Doubles, Floats, Ints, f4
 from .mesh import Mesh
 from .tangents import mesh_dpduv, mesh_tangent_frame
 
@@ -41,8 +40,8 @@ class Attribute:
 
     title: str  # for messages
     default: tuple[float, ...]  # value of a mesh without it, everywhere
-    given: Callable[[Mesh], NDArray[np.float64] | None]  # the user's array for it
-    corners: Callable[[Mesh], NDArray[np.float64]]  # (m, 3, width), if the mesh has it
+    given: Callable[[Mesh], Doubles | None]  # the user's array for it
+    corners: Callable[[Mesh], Doubles]  # (m, 3, width), if the mesh has it
     on_curved: Callable[[CurvedSurfaces, Ints, Floats], Floats]  # at points of primitives: (width, n)
     vectors: bool = False  # whether these are vectors of three numbers each, which instances transform
 
@@ -82,10 +81,10 @@ def _curved_color(surfaces: CurvedSurfaces, prim: Ints, point: Floats) -> Floats
 def _per_vertex(
     title: str,
     default: tuple[float, ...],
-    given: Callable[[Mesh], NDArray[np.float64] | None],
+    given: Callable[[Mesh], Doubles | None],
     on_curved: Callable[[CurvedSurfaces, Ints, Floats], Floats],
 ) -> Attribute:
-    def corners(mesh: Mesh) -> NDArray[np.float64]:
+    def corners(mesh: Mesh) -> Doubles:
         values = given(mesh)
         assert values is not None
         return values[mesh.faces]

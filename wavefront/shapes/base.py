@@ -7,8 +7,9 @@ from collections.abc import Callable
 from typing import TYPE_CHECKING, Any, Self
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from ..arrays.vec import Doubles
 from ..core.errors import number
 from ..materials import Material, MaterialLike, as_material
 from .transform import rotation, scaling, translation
@@ -87,10 +88,10 @@ class Shape(ABC):
 
     @property
     @abstractmethod
-    def bounds(self) -> NDArray[np.float64]:
+    def bounds(self) -> Doubles:
         """Lower and upper corner, (2, 3), scene units."""
 
-    def hull(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    def hull(self) -> tuple[Doubles, Doubles]:
         """Return spheres, centers (n, 3) and radii (n,), whose convex hull contains the shape, closely."""
         corners = np.stack(np.meshgrid(*self.bounds.T), -1).reshape(-1, 3)
         return corners, np.zeros(len(corners))
@@ -188,7 +189,7 @@ class Shape(ABC):
 class CurvedShape(Shape):
     """Base class of shapes whose primitives are not triangles: one `Sphere`, or many of one kind."""
 
-    colors: NDArray[np.float64] | None = None  # (count, 4) linear colors, or None if all are white
+    colors: Doubles | None = None  # (count, 4) linear colors, or None if all are white
 
     @property
     @abstractmethod

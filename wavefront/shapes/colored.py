@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
-from ..arrays.vec import f4
+from ..arrays.vec import Doubles, f4
 from ..bsdfs import Diffuse
 from ..colors import named_rows, srgb_to_linear, warn_of_colormap
 from ..core.errors import SceneError, finite_array
@@ -15,7 +15,7 @@ from ..textures.vertex_colors import VertexColors
 from .base import Checked, Shape
 
 
-def linear_colors(name: str, values: ArrayLike | None) -> NDArray[np.float64] | None:
+def linear_colors(name: str, values: ArrayLike | None) -> Doubles | None:
     """Return (n, 4) linear colors in [0, 1]; colors without an opacity are opaque."""
     if values is None:
         return None

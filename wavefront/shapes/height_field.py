@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ..arrays.vec import Doubles
+from ..arrays.vec import Doubles, Ints
 from ..core.errors import SceneError, finite_array, one_of
 from ..core.suggestions import suggests_keywords
 from ..materials import MaterialLike
@@ -97,16 +97,16 @@ def _places(name: str, places: ArrayLike | None, count: int) -> Doubles:
     return array
 
 
-def _faces(rows: int, columns: int, reverse: bool) -> NDArray[np.intp]:
+def _faces(rows: int, columns: int, reverse: bool) -> Ints:
     """Return two triangles for each square of the grid, (m, 3), whose front is where z rises."""
     corner = (columns * np.arange(rows - 1)[:, None] + np.arange(columns - 1)).reshape(-1, 1)
     right, above = 1, columns
     order = np.array([[0, right, right + above], [0, right + above, above]])
-    faces: NDArray[np.intp] = (corner[:, None] + order).reshape(-1, 3)
+    faces: Ints = (corner[:, None] + order).reshape(-1, 3)
     return faces[:, ::-1] if reverse else faces
 
 
-def _normals(vertices: Doubles, faces: NDArray[np.intp]) -> Doubles:
+def _normals(vertices: Doubles, faces: Ints) -> Doubles:
     """Return normals at vertices, (n, 3): those of the faces around, weighted by their areas."""
     a, b, c = vertices.take(faces, 0).transpose(1, 0, 2)
     areas = np.cross(b - a, c - a)

@@ -9,7 +9,7 @@ from typing import Self
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ..arrays.vec import FLOAT32_MAX
+from ..arrays.vec import FLOAT32_MAX, Bools, Doubles
 from ..core.errors import SceneError, finite_array
 from ..core.suggestions import suggests_keywords
 from ..materials import Material, MaterialLike, as_material
@@ -24,7 +24,7 @@ MOST_HULL = 1 << 22  # vertices of all instances of a mesh; above, its box stand
 CERTAINLY_REGULAR = 1e-6  # above this value, a cheap bound of that ratio is sufficient
 
 
-def _invertible(name: str, value: ArrayLike) -> NDArray[np.float64]:
+def _invertible(name: str, value: ArrayLike) -> Doubles:
     """Return a (4, 4) affine matrix that can be inverted."""
     matrix = finite_array(name, value, (4, 4))
     if not np.array_equal(matrix[3], [0, 0, 0, 1]):
@@ -143,7 +143,7 @@ class Instance(Shape):
         return self.mesh.emission_by(self.material)
 
     @property
-    def bounds(self) -> NDArray[np.float64]:
+    def bounds(self) -> Doubles:
         """Lower and upper corner, (2, 3), of the placed vertices that faces use."""
         return instance_bounds([self])[0]
 
@@ -182,7 +182,7 @@ class Instance(Shape):
         return instance
 
 
-def can_place(mesh: Mesh, transforms: NDArray[np.float64]) -> NDArray[np.bool_]:
+def can_place(mesh: Mesh, transforms: Doubles) -> Bools:
     """Return a mask (n,) of the finite transforms (n, 4, 4) that are valid for an `Instance` of the mesh."""
     good = (transforms[:, 3] == (0, 0, 0, 1)).all(1)
     linear = transforms[:, :3, :3]
@@ -203,7 +203,7 @@ def can_place(mesh: Mesh, transforms: NDArray[np.float64]) -> NDArray[np.bool_]:
     return good
 
 
-def instance_bounds(instances: Sequence[Instance]) -> NDArray[np.float64]:
+def instance_bounds(instances: Sequence[Instance]) -> Doubles:
     """Return the `bounds` of instances, (n, 2, 3); instances of one mesh are computed together."""
     out = np.empty((len(instances), 2, 3))
     numbers: dict[int, list[int]] = {}  # by mesh
@@ -223,7 +223,7 @@ def instance_bounds(instances: Sequence[Instance]) -> NDArray[np.float64]:
     return out
 
 
-def instance_hulls(instances: Sequence[Instance]) -> list[NDArray[np.float64]]:
+def instance_hulls(instances: Sequence[Instance]) -> list[Doubles]:
     """Return points (n, 3) whose convex hull holds the instances, of each mesh apart."""
     groups: dict[int, list[Instance]] = {}
     for instance in instances:
@@ -239,7 +239,7 @@ def instance_hulls(instances: Sequence[Instance]) -> list[NDArray[np.float64]]:
     return out
 
 
-def _placed(transform: NDArray[np.float64], vertices: NDArray[np.float64]) -> NDArray[np.float64]:
+def _placed(transform: Doubles, vertices: Doubles) -> Doubles:
     """Return the transformed vertices (3, n) of vertices (n, 3)."""
     with np.errstate(over="ignore", invalid="ignore"):
         return transform[:3, :3] @ vertices.T + transform[:3, 3:]

@@ -7,9 +7,9 @@ from functools import partial
 from typing import Any, Self
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
-from ..arrays.vec import FLOAT32_MAX, cross, spans
+from ..arrays.vec import FLOAT32_MAX, Doubles, Ints, cross, spans
 from ..core.errors import SceneError, as_array, finite_array, warn_caller
 from ..core.plural import plural
 from ..core.suggestions import suggests_keywords
@@ -25,7 +25,7 @@ AT_ONCE = 1 << 14  # faces whose area is found together, so that they fit the ca
 FLOAT32_MIN = float(np.finfo(np.float32).tiny)
 
 
-def _faces(name: str, faces: ArrayLike) -> NDArray[np.intp]:
+def _faces(name: str, faces: ArrayLike) -> Ints:
     array = as_array(name, faces)
     if array.size == 0:
         raise SceneError(f"{name.removesuffix(': faces')}: has no faces")
@@ -34,14 +34,14 @@ def _faces(name: str, faces: ArrayLike) -> NDArray[np.intp]:
     return array.astype(np.intp)
 
 
-def positions(name: str, values: ArrayLike) -> NDArray[np.float64]:
+def positions(name: str, values: ArrayLike) -> Doubles:
     """Return positions (n, 3) that float32 can hold."""
     array = finite_array(name, values, (None, 3))
     _check_float32(name, array)
     return array
 
 
-def _vectors(name: str, values: ArrayLike | None, width: int = 3) -> NDArray[np.float64] | None:
+def _vectors(name: str, values: ArrayLike | None, width: int = 3) -> Doubles | None:
     """Return vectors (n, width) whose lengths have no meaning, scaled so that float32 can square them.
 
     They are scaled by powers of two, so their directions do not change.
@@ -57,7 +57,7 @@ def _vectors(name: str, values: ArrayLike | None, width: int = 3) -> NDArray[np.
     return array
 
 
-def _coordinates(name: str, values: ArrayLike | None) -> NDArray[np.float64] | None:
+def _coordinates(name: str, values: ArrayLike | None) -> Doubles | None:
     """Return texture coordinates (n, 2) that float32 can hold."""
     if values is None:
         return None
@@ -66,12 +66,12 @@ def _coordinates(name: str, values: ArrayLike | None) -> NDArray[np.float64] | N
     return array
 
 
-def check_range(name: str, vertices: NDArray[np.float64]) -> None:
+def check_range(name: str, vertices: Doubles) -> None:
     """Raise a SceneError if a vertex (n, 3) of the shape `name` is beyond the range of float32."""
     _check_float32(f"{name}: vertices", vertices)
 
 
-def _check_float32(name: str, rows: NDArray[np.float64]) -> None:
+def _check_float32(name: str, rows: Doubles) -> None:
     bad = np.argwhere(np.abs(rows) > FLOAT32_MAX)
     if len(bad):
         i, j = bad[0]
@@ -243,7 +243,7 @@ class Mesh(ColoredShape):
         if self.normals is None:
             self._split(np.repeat(facet_normals(self.vertices, self.faces).T[:, None], 3, 1))
 
-    def _split(self, corners: NDArray[np.float64]) -> None:
+    def _split(self, corners: Doubles) -> None:
         """Give the corners of the faces normals (m, 3, 3): vertices with several are split."""
         faces, normals, origin = split_vertices(self.faces, corners)
         self.faces, self.vertices, self.normals = faces, self.vertices[origin], normals
@@ -274,12 +274,12 @@ class Mesh(ColoredShape):
         return mesh
 
     @property
-    def bounds(self) -> NDArray[np.float64]:
+    def bounds(self) -> Doubles:
         """Lower and upper corner, (2, 3), of the vertices that faces use."""
         rows = np.ascontiguousarray(self.hull()[0].T)
         return np.stack([rows.min(1), rows.max(1)])
 
-    def hull(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    def hull(self) -> tuple[Doubles, Doubles]:
         """Return the vertices that faces use, as spheres of radius 0."""
         used = np.zeros(len(self.vertices), np.bool_)
         used[self.faces] = True
@@ -287,7 +287,7 @@ class Mesh(ColoredShape):
         return points, np.zeros(len(points))
 
 
-def _faces_of_zero_area(vertices: NDArray[np.float64], faces: NDArray[np.intp]) -> NDArray[np.intp]:
+def _faces_of_zero_area(vertices: Doubles, faces: Ints) -> Ints:
     """Return the numbers of the faces whose corners lie on a line, or in a point."""
     found = []
     for part in spans(len(faces), AT_ONCE):

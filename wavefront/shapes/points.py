@@ -6,8 +6,9 @@ from collections.abc import Iterable
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from ..arrays.vec import Doubles
 from ..colors import srgb
 from ..core.errors import SceneError, as_array, finite_array, warn_caller
 from ..core.suggestions import suggests_keywords
@@ -121,7 +122,7 @@ def point_colors(data: Any) -> Any:
     return found[0] if found else None
 
 
-def usual_radius(points: NDArray[np.float64]) -> float:
+def usual_radius(points: Doubles) -> float:
     """Return a radius for spheres at points (n, 3) so that they nearly touch: see `Points`."""
     count = len(points)
     some = points[:: max(1, count // max(LEAST_POINTS, MOST_DISTANCES // count))]
@@ -135,7 +136,7 @@ def usual_radius(points: NDArray[np.float64]) -> float:
     return radius or 0.01 * float(np.linalg.norm(np.ptp(points, axis=0))) or 1.0
 
 
-def _ends_of_mesh(mesh: Any) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+def _ends_of_mesh(mesh: Any) -> tuple[Doubles, Doubles]:
     """Return the ends (n, 3) of the edges of a mesh, each once.
 
     Vertices in one place count as one, so that an edge between faces that share no vertices is there once.
@@ -150,7 +151,7 @@ def _ends_of_mesh(mesh: Any) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     return places[pairs[:, 0]], places[pairs[:, 1]]
 
 
-def _ends_of_lines(name: str, lines: Any) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+def _ends_of_lines(name: str, lines: Any) -> tuple[Doubles, Doubles]:
     """Return the ends (n, 3) of the pieces of lines."""
     given, of_path = lines, hasattr(lines, "entities")
     if of_path:

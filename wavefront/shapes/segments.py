@@ -6,10 +6,11 @@ from copy import copy
 from typing import Self
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from ..arrays.elementary import sin_cos_turns
 from ..arrays.frame import Frame
+from ..arrays.vec import Doubles
 from ..core.errors import SceneError
 from ..core.plural import plural
 from ..core.suggestions import suggests_keywords
@@ -75,18 +76,18 @@ class SegmentArray(PrimitiveArray):
         return shape
 
     @property
-    def bounds(self) -> NDArray[np.float64]:
+    def bounds(self) -> Doubles:
         """Lower and upper corner, (2, 3)."""
         reach = self._reach()
         low = np.minimum(self.starts, self.ends) - reach
         return np.stack([low.min(0), (np.maximum(self.starts, self.ends) + reach).max(0)])
 
-    def hull(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    def hull(self) -> tuple[Doubles, Doubles]:
         """Return balls about both ends."""
         radii = np.broadcast_to(self.radii, self.count)
         return np.concatenate([self.starts, self.ends]), np.tile(radii, 2)
 
-    def _reach(self) -> NDArray[np.float64]:
+    def _reach(self) -> Doubles:
         """Return how far the surfaces reach beyond the ends of the segments, (n, 3) or (n, 1)."""
         return self.radii[:, None]
 
@@ -142,13 +143,13 @@ class Cylinders(SegmentArray):
         self.caps = bool(caps)
         super().__init__(starts, ends, radii, colors, material, name)
 
-    def _reach(self) -> NDArray[np.float64]:
+    def _reach(self) -> Doubles:
         """Return how far flat ends reach, (n, 3): the radius, times the sine of axis and coordinate axis."""
         span = self.ends - self.starts
         axis = span / np.linalg.norm(span, axis=1, keepdims=True)
         return self.radii[:, None] * np.sqrt(np.maximum(1 - axis**2, 0))
 
-    def hull(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    def hull(self) -> tuple[Doubles, Doubles]:
         """Return the corners of polygons about the circles at both ends."""
         span = self.ends - self.starts
         frame = Frame.from_normal((span / np.linalg.norm(span, axis=1, keepdims=True)).T.astype(np.float32))

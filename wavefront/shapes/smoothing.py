@@ -33,7 +33,7 @@ def check_smooth(name: str, value: Any) -> bool | float | str:
     return number(name, value, lambda x: 0 <= x <= 180, "a crease angle from 0 to 180 degrees")
 
 
-def crease_normals(vertices: Doubles, faces: NDArray[np.intp], degrees: float) -> Doubles | None:
+def crease_normals(vertices: Doubles, faces: Ints, degrees: float) -> Doubles | None:
     """Return unit normals at the corners of faces, (m, 3, 3); None if all are those of the facets.
 
     The normal of a corner is the average of the normals of the faces at its vertex that are within a crease
@@ -84,18 +84,18 @@ def crease_normals(vertices: Doubles, faces: NDArray[np.intp], degrees: float) -
     return out.reshape(-1, 3, 3)
 
 
-def facet_normals(vertices: Doubles, faces: NDArray[np.intp]) -> Floats:
+def facet_normals(vertices: Doubles, faces: Ints) -> Floats:
     """Return the unit normals (3, m) of faces; zero for those without an area."""
     return normalize(_twice_areas(vertices, faces))
 
 
-def _twice_areas(vertices: Doubles, faces: NDArray[np.intp]) -> Floats:
+def _twice_areas(vertices: Doubles, faces: Ints) -> Floats:
     """Return normals (3, m) of faces, as long as twice their areas."""
     a, b, c = np.ascontiguousarray(vertices[faces].transpose(1, 2, 0))
     return cross(b - a, c - a)
 
 
-def split_vertices(faces: NDArray[np.intp], normals: Doubles) -> tuple[NDArray[np.intp], Doubles, Ints]:
+def split_vertices(faces: Ints, normals: Doubles) -> tuple[Ints, Doubles, Ints]:
     """Return a mesh with one normal for each vertex: vertices on creases are split.
 
     Parameters

@@ -6,9 +6,9 @@ from copy import copy
 from typing import Self
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
-from ..arrays.vec import FLOAT32_MAX
+from ..arrays.vec import FLOAT32_MAX, Doubles
 from ..bsdfs import Diffuse
 from ..core.errors import SceneError, finite_array, number, rotation_matrix
 from ..core.suggestions import suggests_keywords
@@ -20,7 +20,7 @@ from .sphere_emission import SphereEmission
 from .transform import points_by, similarities
 
 
-def _center(name: str, value: ArrayLike) -> NDArray[np.float64]:
+def _center(name: str, value: ArrayLike) -> Doubles:
     center = finite_array(name, value, (3,))
     beyond = np.flatnonzero(np.abs(center) > FLOAT32_MAX)
     if len(beyond):
@@ -34,7 +34,7 @@ def _radius(name: str, value: float) -> float:
     return number(name, value, lambda x: FLOAT32_MIN <= x <= FLOAT32_MAX, limit)
 
 
-def _transform(name: str, value: ArrayLike | None) -> NDArray[np.float64] | None:
+def _transform(name: str, value: ArrayLike | None) -> Doubles | None:
     return None if value is None else rotation_matrix(name, value)
 
 
@@ -108,12 +108,12 @@ class Sphere(SphereEmission):
         return 1
 
     @property
-    def centers(self) -> NDArray[np.float64]:
+    def centers(self) -> Doubles:
         """The center as one row, (1, 3)."""
         return self.center[None]
 
     @property
-    def radii(self) -> NDArray[np.float64]:
+    def radii(self) -> Doubles:
         """The radius as an array, (1,)."""
         return np.array([self.radius])
 
@@ -150,10 +150,10 @@ class Sphere(SphereEmission):
         return sphere
 
     @property
-    def bounds(self) -> NDArray[np.float64]:
+    def bounds(self) -> Doubles:
         """Lower and upper corner, (2, 3)."""
         return np.stack([self.center - self.radius, self.center + self.radius])
 
-    def hull(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    def hull(self) -> tuple[Doubles, Doubles]:
         """Return centers and radii."""
         return self.centers, np.broadcast_to(self.radii, self.count)

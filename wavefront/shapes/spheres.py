@@ -6,8 +6,9 @@ from copy import copy
 from typing import Self
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from ..arrays.vec import Doubles
 from ..core.suggestions import suggests_keywords
 from ..materials import MaterialLike
 from ..textures.parameter import Color
@@ -82,11 +83,11 @@ class Spheres(SphereEmission, PrimitiveArray):
         return spheres
 
     @property
-    def bounds(self) -> NDArray[np.float64]:
+    def bounds(self) -> Doubles:
         """Lower and upper corner, (2, 3)."""
         radii = self.radii[:, None]
         return np.stack([(self.centers - radii).min(0), (self.centers + radii).max(0)])
 
-    def hull(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    def hull(self) -> tuple[Doubles, Doubles]:
         """Return centers and radii."""
         return self.centers, np.broadcast_to(self.radii, self.count)

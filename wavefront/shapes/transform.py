@@ -5,19 +5,19 @@ from __future__ import annotations
 from functools import reduce
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from ..arrays.elementary import sin_cos_turns
 from ..arrays.vec import Doubles, Ints
 from ..core.errors import SceneError, as_array, finite_array, number, one_of
 
-Matrix = NDArray[np.float64]  # (4, 4), or several
+Matrix = Doubles  # (4, 4), or several
 
 IDENTITY = np.eye(4)
 EVEN = 2.0**-20  # relative difference of the scales along two axes that float32 hardly shows
 
 
-def similarities(name: str, value: ArrayLike) -> tuple[Matrix, NDArray[np.float64]]:
+def similarities(name: str, value: ArrayLike) -> tuple[Matrix, Doubles]:
     """Return matrices (n, 4, 4) that keep shapes, of one (4, 4) or of n, and the factors of lengths (n,).
 
     Raises
@@ -42,7 +42,7 @@ def similarities(name: str, value: ArrayLike) -> tuple[Matrix, NDArray[np.float6
     return matrices, np.sqrt(reduce(np.add, squares) / 3)  # in order, for the same bits on any machine
 
 
-def points_by(matrices: Matrix, points: NDArray[np.float64]) -> NDArray[np.float64]:
+def points_by(matrices: Matrix, points: Doubles) -> Doubles:
     """Return points (k, 3), transformed by each of n matrices (n, 4, 4): (n·k, 3)."""
     return (points @ matrices[:, :3, :3].transpose(0, 2, 1) + matrices[:, None, :3, 3]).reshape(-1, 3)
 

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ..arrays.state import SurfaceInteraction
-from ..arrays.vec import Floats, Ints, f4, luminance
+from ..arrays.vec import Doubles, Floats, Ints, f4, luminance
 from ..codecs.budget import Budget
 from ..codecs.images import read_codes
 from ..colors import srgb_to_linear
@@ -281,7 +281,7 @@ def _pair(wrap: Any) -> tuple[str, str]:
     return u, v
 
 
-def _transformed(matrix: NDArray[np.float64], uv: Floats) -> tuple[Floats, Floats]:
+def _transformed(matrix: Doubles, uv: Floats) -> tuple[Floats, Floats]:
     m = matrix.astype(f4)
     return m[0, 0] * uv[0] + m[0, 1] * uv[1] + m[0, 2], m[1, 0] * uv[0] + m[1, 1] * uv[1] + m[1, 2]
 

@@ -7,8 +7,8 @@ from math import ceil, log10, sqrt
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ..arrays.vec import Doubles
 from ..camera import Camera
 from ..camera.projection import Perspective
 from ..core.errors import SceneError, finite_array, number
@@ -34,13 +34,13 @@ class Surroundings:
     radius: float  # scene units
 
     @classmethod
-    def of(cls, bounds: NDArray[np.float64]) -> Surroundings:
+    def of(cls, bounds: Doubles) -> Surroundings:
         """Return those of a scene with bounds (2, 3)."""
         low, high = bounds
         x, y, z = ((low + high) / 2).tolist()
         return cls((x, y, z), float(np.linalg.norm(high - low)) / 2 or 1.0)
 
-    def to_page(self, point: Triple) -> NDArray[np.float64]:
+    def to_page(self, point: Triple) -> Doubles:
         """Return a point (3,) of the scene on the page."""
         return (np.array(point) - self.center) / self.radius
 
@@ -82,7 +82,7 @@ class Viewpoint:
     pixels: int  # of a picture, at most
 
     @classmethod
-    def of(cls, camera: Camera, bounds: NDArray[np.float64], up: NDArray[np.float64]) -> Viewpoint:
+    def of(cls, camera: Camera, bounds: Doubles, up: Doubles) -> Viewpoint:
         """Return that of a camera.
 
         The target is the point of the view axis that is nearest to the middle of the scene. Cameras that

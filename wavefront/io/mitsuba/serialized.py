@@ -9,8 +9,8 @@ import struct
 import zlib
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ...arrays.vec import Doubles
 from ...core.errors import SceneError
 from ..repair import RawMesh
 from ..sources import SceneFiles
@@ -42,7 +42,7 @@ class _Stream:
             raise SceneError(f"{self._name}: ends {size - len(found)} bytes before the end of its mesh")
         return found
 
-    def rows(self, count: int, width: int, kind: str) -> NDArray[np.float64]:
+    def rows(self, count: int, width: int, kind: str) -> Doubles:
         """Return an array (count, width)."""
         values = np.frombuffer(self.read(count * width * np.dtype(kind).itemsize), kind)
         with np.errstate(invalid="ignore"):

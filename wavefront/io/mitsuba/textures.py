@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...arrays.state import SurfaceInteraction
-from ...arrays.vec import Floats, luminance
+from ...arrays.vec import Doubles, Floats, luminance
 from ...colors import srgb_to_linear
 from ...colors.spectrum import blackbody, spectrum_rgb, uniform_emission
 from ...core.errors import SceneError, as_array, finite_array, in_brief, number
@@ -229,7 +229,7 @@ def _mesh_attribute(node: Node, job: Job) -> Value:
 unsupported("volume", "texture")
 
 
-def _to_uv(node: Node) -> NDArray[np.float64]:
+def _to_uv(node: Node) -> Doubles:
     """Return the transform of texture coordinates, (3, 3)."""
     value = node.get("to_uv", np.eye(4))
     matrix = as_array("to_uv", getattr(value, "matrix", value))

@@ -7,10 +7,9 @@ from copy import copy
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ...arrays.state import SurfaceInteraction
-from ...arrays.vec import Floats, f4
+from ...arrays.vec import Doubles, Floats, f4
 from ...core.errors import SceneError
 from ...textures.base import BaseTexture
 from ...textures.image import Texture
@@ -217,7 +216,7 @@ def _between(one: Value, two: Value, amount: Value) -> Value:
     return value
 
 
-def _mapping(entity: Entity) -> NDArray[np.float64]:
+def _mapping(entity: Entity) -> Doubles:
     """Return the transform of texture coordinates, (3, 3)."""
     kind = entity.choice("mapping", "uv", ("uv", "spherical", "cylindrical", "planar"))
     if kind != "uv":
