@@ -293,7 +293,7 @@ def test_black_first_points_take_no_part(albedo: float, there: bool) -> None:
     surface = SurfaceInteraction(np.zeros((3, n), f4), zero, up, up, up, lane, lane, np.zeros(n, bool))
     lit = SimpleNamespace(surface=surface, start=np.zeros((3, n), f4), guidance_at=lambda lanes: None)
     lane_in = np.array([[0, 1], [2, -1]])
-    first = FirstPoints.of(OPEN, lit, np.full((3, n), albedo, f4), lane_in)
+    first = FirstPoints.of(lit, np.full((3, n), albedo, f4), lane_in)
     assert first is not None
     assert np.array_equal(first.present, (lane_in >= 0) & there)
 

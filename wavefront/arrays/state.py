@@ -177,6 +177,9 @@ class SurfaceInteraction(SoA):
     tangent_frame1: Floats | None = None  # (6, n) the same for uv1
     throughput: Floats | None = None  # (3, n) of the paths; None unless a material is dispersive
     unmapped: Floats | None = None  # (3, n) ns without a normal map; None unless one shadows grazing light
+    folds: Bools | None = (
+        None  # (n,) scattering is folded at the surface (stages/normal_mapping.py), or nowhere
+    )
     index_around: Floats | None = None  # (n,) of refraction, outside of the surfaces; None where it is 1
 
     def frame(self) -> Frame:

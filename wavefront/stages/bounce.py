@@ -7,12 +7,13 @@ from dataclasses import replace
 import numpy as np
 
 from ..arrays.state import BounceDepth, Paths
-from ..arrays.vec import Bools, Bytes, Floats, Ints, broadcast, f4, normalize, signs, take
+from ..arrays.vec import Bools, Bytes, Floats, Ints, broadcast, dot, f4, normalize, signs, take
 from ..bsdfs import BsdfSample, sampled
 from ..sampling.sampler import Dimension, Sampler
 from .guidance import mix_with_guide
 from .interaction import LIFT, offset_origin
-from .shade import Shading
+from .normal_mapping import folded_onto, mirrored_at_surface
+from .shade import Shading, evaluate_unfolded
 
 # (3, 2) the depth after a scattering, by the depth before it and by whether it is specular
 DEPTH_AFTER = np.array(
@@ -53,12 +54,15 @@ def bounce_sample(paths: Paths, shade: Shading, sampler: Sampler, bounce: int) -
     """Sample the BSDF at each point and return the paths as they leave it.
 
     The throughput is 0 where there is no sample. Where shading and geometric normal disagree on the
-    side of the sampled direction it is 0 at opaque surfaces; at others the direction is turned.
+    side of the sampled direction, this is folded (normal_mapping.py) if a normal map has tilted the
+    normal. If vertex normals have, the throughput is 0 at opaque surfaces; at others it is turned.
     """
     surface = shade.surface
     sample = _sample(shade, _numbers(paths, shade, sampler, bounce))
     direction = shade.frame.to_world(sample.wi)
     roulette_scale = paths.roulette_scale if sample.eta is None else paths.roulette_scale * sample.eta**2
+    if surface.folds is not None:
+        sample, direction = _folded(shade, sample, direction)
     if shade.guidance is not None:
         sample, direction, gain = mix_with_guide(shade, paths, sample, direction, sampler, bounce)
         roulette_scale = roulette_scale * gain
@@ -97,6 +101,28 @@ def bounce_sample(paths: Paths, shade: Shading, sampler: Sampler, bounce: int) -
     if paths.recorder is not None:
         paths.recorder.record_scattering(paths, shade, left)
     return left
+
+
+def _folded(shade: Shading, sample: BsdfSample, direction: Floats) -> tuple[BsdfSample, Floats]:
+    """Return samples and world directions (3, n), those folded that lead to the wrong side of `ng`."""
+    surface = shade.surface
+    assert surface.folds is not None
+    wi, weight, pdf = sample.wi.copy(), sample.weight.copy(), sample.pdf.copy()
+    wrong = surface.folds & (wi[2] * dot(surface.ng, direction) < 0)
+    lanes = np.flatnonzero(wrong)
+    direction[:, lanes] = mirrored_at_surface(surface.ng.take(lanes, 1), direction.take(lanes, 1))
+    wi[:, lanes] = shade.frame.take(lanes).to_local(direction.take(lanes, 1))
+    twice, image = folded_onto(surface, shade.frame, wi)
+    some = np.flatnonzero(~take(sample.specular, twice) & (pdf.take(twice) > 0))
+    if some.size:
+        twice = twice.take(some)
+        # the direction that could have been drawn, too
+        other = np.where(wrong.take(twice), wi.take(twice, 1), image.take(some, 1))
+        f, more = evaluate_unfolded(shade.at(twice), other)
+        one, both = pdf.take(twice), pdf.take(twice) + more
+        weight[:, twice] = (weight.take(twice, 1) * one + f * np.abs(other[2])) / both
+        pdf[twice] = both
+    return replace(sample, wi=wi, weight=weight, pdf=pdf), direction
 
 
 def _after(depth: Bytes, specular: Bools) -> Bytes:

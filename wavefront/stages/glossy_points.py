@@ -74,9 +74,9 @@ class GlossyPoints:
             pdf[found.lanes] = scene.lights.pdf_li(found.light, start, found.wi, receiver)
         return cls(shade, sampled, pdf, light, onward), found
 
-    def toward(self, scene: CompiledScene, which: Ints, wo: Floats | None = None) -> Shading:
+    def toward(self, which: Ints, wo: Floats | None = None) -> Shading:
         """Return the surfaces of some points (k,) as seen from directions (3, k) or as at first."""
-        shade = self.shade.at(scene, which)
+        shade = self.shade.at(which)
         return shade if wo is None else replace(shade, wo=shade.frame.to_local(wo))
 
     def of_samples(self, scene: CompiledScene, which: Ints, shade: Shading) -> Floats:

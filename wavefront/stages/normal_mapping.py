@@ -1,11 +1,22 @@
-"""Shading normals perturbed by normal maps and bump maps."""
+"""Shading normals perturbed by normal maps and bump maps, and scattering around them.
+
+A BSDF around a perturbed normal scatters light to below the surface. There it is folded: mirrored at the
+surface, as if it met a mirror that lies flat. So no light is lost. With M the mirror image at the surface,
+and for wi that is on the same side of the surface as of the perturbed normal,
+
+    f'(wo, wi) cos(wi) = f(wo, wi) cos(wi) + f(wo, M wi) cos(M wi)
+
+where the second term counts if M wi is on the wrong side of the surface; and the density likewise. M keeps
+solid angles, so that f' scatters as much to the right side as f does to both.
+"""
 
 from __future__ import annotations
 
 import numpy as np
 
+from ..arrays.frame import Frame
 from ..arrays.state import SurfaceInteraction
-from ..arrays.vec import Floats, dot, f4, normalize
+from ..arrays.vec import Floats, Ints, dot, f4, normalize, take
 from ..compile.scene import CompiledScene
 from .interaction import LIFT, face_viewer
 
@@ -20,6 +31,8 @@ def perturb_normals(scene: CompiledScene, surface: SurfaceInteraction) -> None:
     if any(normal_map.shadows_grazing for normal_map in materials.normal_maps):
         surface.unmapped = surface.ns
     surface.ns = surface.ns.copy()  # it may be ng itself
+    if any(normal_map.folds_light for normal_map in materials.normal_maps):
+        surface.folds = np.zeros(len(surface), np.bool_)
     normal_map_of = materials.normal_map_of.take(surface.material)
     for number, normal_map in enumerate(materials.normal_maps):
         lanes = np.flatnonzero(normal_map_of == number)
@@ -34,6 +47,8 @@ def perturb_normals(scene: CompiledScene, surface: SurfaceInteraction) -> None:
             valid = mirror_hidden(wo, smooth, normal)
         else:
             valid = ensure_valid_reflection(wo, ng, smooth, normal)
+        if normal_map.folds_light and surface.folds is not None:
+            surface.folds[lanes.take(which)] = True
         surface.ns[:, lanes.take(which)] = valid
         if surface.unmapped is not None and not normal_map.shadows_grazing:
             surface.unmapped = surface.unmapped.copy()
@@ -57,8 +72,7 @@ def ensure_valid_reflection(wo: Floats, ng: Floats, smooth: Floats, perturbed: F
     Where the cosine of the reflected direction with `ng` would be below `LIFT`, the direction is raised to
     that cosine, and the half vector of it and wo becomes the normal: a mirror has no black facets, and rough
     reflection loses little energy. The cosine is not raised above that of a reflection about `smooth`, the
-    normal without the map, so that a weak map changes little. Other samples that lead below the surface are
-    rejected (stages/shade.py and bounce.py compare the sides), so that no light leaks and none is gained.
+    normal without the map, so that a weak map changes little. Other directions below the surface are folded.
 
     Source: A. Keller et al. 2017, "The Iray Light Transport Simulation and Rendering System",
     arXiv:1705.01263, appendix A.3. Here directions are raised along the geometric normal, because the
@@ -75,3 +89,20 @@ def ensure_valid_reflection(wo: Floats, ng: Floats, smooth: Floats, perturbed: F
         raised = normalize(mirrored.take(low, 1) + ng.take(low, 1) * missing.take(low))
         perturbed[:, low] = normalize(raised + wo.take(low, 1))
     return face_viewer(wo, perturbed)  # against rounding errors where wo grazes the surface
+
+
+def mirrored_at_surface(ng: Floats, wi: Floats) -> Floats:
+    """Return the mirror images (3, n) of directions at surfaces with unit normals ng (3, n)."""
+    return wi - ng * (f4(2) * dot(ng, wi))
+
+
+def folded_onto(surface: SurfaceInteraction, frame: Frame, wi: Floats) -> tuple[Ints, Floats]:
+    """Return the lanes (k,) where another local direction is folded onto wi (3, n), and which: (3, k).
+
+    Both are then on the same side of the perturbed normal, and `wi` makes the larger cosine with it.
+    """
+    assert surface.folds is not None
+    ng = frame.to_local(surface.ng)
+    other, side = mirrored_at_surface(ng, wi), dot(ng, wi)
+    lanes = np.flatnonzero(surface.folds & (wi[2] * side > 0) & (other[2] * side > 0))
+    return lanes, take(other, lanes)

@@ -154,11 +154,12 @@ def add_shared(
     number_in = [
         tiles.grid(points.slot, np.flatnonzero(shining & (points.way == way))) for way in range(branches)
     ]
-    plain = lit.surface.unmapped is None and all(bsdf.lambertian for _, bsdf in lit.groups)
+    own_cosine = lit.surface.unmapped is None and lit.surface.folds is None
+    plain = own_cosine and all(bsdf.lambertian for _, bsdf in lit.groups)
     albedo = lit.albedo() if plain else None
     received = [np.zeros((3, slot.size), f4) for _ in sums]
     for some in spans(tiles.count, TILES_AT_ONCE):
-        first = FirstPoints.of(scene, lit, albedo, lane_in[:, some])
+        first = FirstPoints.of(lit, albedo, lane_in[:, some])
         if first is None:
             continue
         numbers = [numbers[:, some] for numbers in number_in]
@@ -183,7 +184,7 @@ def _leaving(
     some = np.flatnonzero(number >= k)
     if glossy is not None and some.size:
         at = number.take(some)
-        shade = glossy.toward(scene, at - k)
+        shade = glossy.toward(at - k)
         f, pdf = glossy.of_next(at - k, shade)
         f /= np.where(pdf > 0, pdf, f4(1))
         arriving = glossy.of_samples(scene, at - k, shade) * take(light, at)
@@ -264,7 +265,7 @@ def _add_glossy(
         if not some.size:
             continue
         cell, which = cells.take(some), at.take(some)
-        shade = glossy.toward(scene, which, take(wo, some))
+        shade = glossy.toward(which, take(wo, some))
         part = weight.reshape(-1, t * MEMBERS).take(cell, 1)
         if by_samples:
             f, column = glossy.of_samples(scene, which, shade), matte
@@ -296,7 +297,7 @@ class FirstPoints:
     guidance: Guidance | None
 
     @classmethod
-    def of(cls, scene: CompiledScene, lit: Shading, albedo: Floats | None, lane_in: Ints) -> Self | None:
+    def of(cls, lit: Shading, albedo: Floats | None, lane_in: Ints) -> Self | None:
         """Return the points of a grid (members, t) of lanes, where -1 stands for none; None if all are -1.
 
         Parameters
@@ -312,7 +313,7 @@ class FirstPoints:
             return None
         lanes = np.where(present, lane_in, some[0]).reshape(-1)
         if albedo is None:
-            at = lit.at(scene, lanes)
+            at = lit.at(lanes)
             start, error = at.start.reshape(3, *shape), at.surface.error.reshape(shape)
             return cls(present, start, error, at.surface.prim, at.surface.ns, at, None, None, at.guidance)
         surface, albedo = lit.surface, take(albedo, lanes).reshape(3, *shape)

@@ -23,6 +23,7 @@ from ..sampling.sampler import Dimension, Sampler
 from ..sampling.steps import StepNumbers
 from .interaction import interaction, offset_origin, origin_above
 from .intersect import ShadowRays, shadow_rays, visible
+from .normal_mapping import folded_onto
 from .transmittance import transmittance_along
 
 UP = column((0, 0, 1))
@@ -56,6 +57,7 @@ class Shading:
     receiver: Receiver | None = None  # what lights are sampled for; None where no light takes it
     volume: Ints | None = None  # lanes within media, where there is no cosine; None in scenes without media
     crossing: Any = None  # (n,) what light that crosses the surfaces does to stacks; likewise
+    materials: MaterialTable | None = None  # of the scene
 
     def lit(self) -> Shading:
         """Return the lanes that need light sampling; the groups after them have only delta lobes."""
@@ -68,17 +70,18 @@ class Shading:
         parts = self.surface.take(first), self.frame.take(first), self.wo[:, first], self.start[:, first]
         receiver = None if self.receiver is None else self.receiver.take(first)
         crossing = None if self.crossing is None else self.crossing[first]
-        return Shading(*parts, groups, self.guidance, receiver, self.volume, crossing)
+        return Shading(*parts, groups, self.guidance, receiver, self.volume, crossing, self.materials)
 
-    def at(self, scene: CompiledScene, lanes: Ints) -> Shading:
+    def at(self, lanes: Ints) -> Shading:
         """Return the surfaces of some lanes (k,) of `lit`, in any order; a lane may occur again."""
         surface = self.surface.take(lanes)
         if self.surface.ns is self.surface.ng:
             surface.ns = surface.ng
         parts = surface, self.frame.take(lanes), take(self.wo, lanes), take(self.start, lanes)
         receiver = None if self.receiver is None else self.receiver.take(lanes)
-        groups = list(_groups_anywhere(scene.materials, surface))
-        return Shading(*parts, groups, self.guidance_at(lanes), receiver)
+        assert self.materials is not None
+        groups = list(_groups_anywhere(self.materials, surface))
+        return Shading(*parts, groups, self.guidance_at(lanes), receiver, materials=self.materials)
 
     def guidance_at(self, lanes: Ints) -> Guidance | None:
         """Return what guides some lanes (k,) of `lit`; None where nothing does."""
@@ -200,7 +203,9 @@ def shading(scene: CompiledScene, surface: SurfaceInteraction) -> Shading:
     else:
         wo = frame.to_local(surface.wo)
     receiver = receiver_of(surface, groups) if scene.lights.takes_receiver else None
-    shade = Shading(surface, frame, wo, origin_above(surface), groups, receiver=receiver)
+    shade = Shading(
+        surface, frame, wo, origin_above(surface), groups, receiver=receiver, materials=scene.materials
+    )
     if scene.media is not None:
         shade.volume = np.flatnonzero(surface.prim < 0)
         shade.crossing = scene.media.crossing(surface.material, surface.back_facing)
@@ -333,6 +338,20 @@ def radiance_at_samples(
 
 def evaluate(shade: Shading, wi: Floats) -> tuple[Floats, Floats]:
     """Return f (3, n), without the cosine, and the pdf (n,) of local directions wi (3, n)."""
+    f, pdf = evaluate_unfolded(shade, wi)
+    if shade.surface.folds is None:
+        return f, pdf
+    lanes, other = folded_onto(shade.surface, shade.frame, wi)
+    if lanes.size:
+        f, pdf = f.copy(), pdf.copy()
+        more, pdf_more = evaluate_unfolded(shade.at(lanes), other)
+        f[:, lanes] += more * (other[2] / wi[2].take(lanes))
+        pdf[lanes] += pdf_more
+    return f, pdf
+
+
+def evaluate_unfolded(shade: Shading, wi: Floats) -> tuple[Floats, Floats]:
+    """Return f (3, n) and the pdf (n,) as they are before directions are folded."""
     if len(shade.groups) == 1:
         return evaluated(shade.groups[0][1], shade.wo, wi)
     n = wi.shape[1]

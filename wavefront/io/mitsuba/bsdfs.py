@@ -167,6 +167,7 @@ def _mapped(node: Node, job: Job, make: Any, channel: Any) -> Material:
             value = Texture(np.broadcast_to(value, 3).astype(np.float32).reshape(1, 1, 3), channel=channel)
         texture = value
     normal_map = make(texture)
+    normal_map.folds_light = False
     normal_map.shadows_grazing = node.flag("use_shadowing_function", True)
     normal_map.mirrors_hidden = node.flag("flip_invalid_normals", True)
     if not normal_map.mirrors_hidden:

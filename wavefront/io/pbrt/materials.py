@@ -72,6 +72,8 @@ def _made(entity: Entity, bsdf: Any, job: Job) -> Material:
         bumps = BumpMap(heights)
     elif isinstance(height, BaseTexture):
         entity.lose("displacement")
+    if bumps is not None:
+        bumps.folds_light = False
     return Material(bsdf, normal_map=bumps, name=entity.name or None)
 
 
