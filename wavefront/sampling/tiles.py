@@ -31,30 +31,35 @@ def place_in_tiles(pixel: Words, width: int) -> tuple[Ints, Ints]:
     pixel
         (n,) row-major indices in a picture of this width.
     """
-    block = SIDE * STRIDE
-    number = pixel.astype(np.intp)
-    y = number // width
-    x = number - y * width
-    block_x, block_y = x // block, y // block
-    member = (y % block // STRIDE) * SIDE + x % block // STRIDE
+    (y, x), side = _divided(pixel.astype(np.uint32), width), SIDE * STRIDE
+    (block_x, x), (block_y, y) = _divided(x, side), _divided(y, side)
+    (cell_x, x), (cell_y, y) = _divided(x, STRIDE), _divided(y, STRIDE)
+    member = cell_y * np.uint32(SIDE) + cell_x
     shift_x, shift_y = cell_shifts(block_x, block_y, member)
-    tile_x, tile_y = (x + shift_x) % STRIDE, (y + shift_y) % STRIDE
-    across = -(-width // block)
-    tile = ((block_y * across + block_x) * STRIDE + tile_y) * STRIDE + tile_x
-    return tile, member
+    tile_x, tile_y = _divided(x + shift_x, STRIDE)[1], _divided(y + shift_y, STRIDE)[1]
+    block = block_y * np.uint32(-(-width // side)) + block_x
+    tile = (block * np.uint32(STRIDE) + tile_y) * np.uint32(STRIDE) + tile_x
+    return tile.astype(np.intp), member.astype(np.intp)
 
 
-def cell_shifts(block_x: Ints, block_y: Ints, member: Ints) -> tuple[Ints, Ints]:
+def _divided(numbers: Words, divisor: int) -> tuple[Words, Words]:
+    """Return quotients and remainders (n,); much faster than `np.divmod` and with longer integers."""
+    whole = numbers // np.uint32(divisor)
+    return whole, numbers - whole * np.uint32(divisor)
+
+
+def cell_shifts(block_x: Words, block_y: Words, member: Words) -> tuple[Words, Words]:
     """Return by how many pixels, (n,) in x and y, the tiles of cells are shifted: a hash of the cells.
 
     The hash is that of C. Wellons, Prospecting for Hash Functions, 2018, lowbias32.
     """
-    h = (block_x * 0x9E3779B1 + block_y * 0x85EBCA77 + member * 0xC2B2AE3D).astype(np.uint32)
+    h = block_x * np.uint32(0x9E3779B1) + block_y * np.uint32(0x85EBCA77) + member * np.uint32(0xC2B2AE3D)
     for shift, factor in ((16, 0x7FEB352D), (15, 0x846CA68B)):
         h ^= h >> np.uint32(shift)
         h *= np.uint32(factor)
     h ^= h >> np.uint32(16)
-    return (h % STRIDE).astype(np.intp), (h // STRIDE % STRIDE).astype(np.intp)
+    rest, shift_x = _divided(h, STRIDE)
+    return shift_x, _divided(rest, STRIDE)[1]
 
 
 def block_of(pixel: Words, width: int) -> Ints:
@@ -69,7 +74,8 @@ def pixels_of_tiles(place: Ints, across: int) -> tuple[Ints, Ints]:
     """
     block, tile = np.divmod(place[:, None], STRIDE * STRIDE)
     (block_y, block_x), member = np.divmod(block, across), np.arange(MEMBERS)
-    shift_x, shift_y = cell_shifts(block_x, block_y, member)
+    cells = (each.astype(np.uint32) for each in (block_x, block_y, member))
+    shift_x, shift_y = (each.astype(np.intp) for each in cell_shifts(*cells))
     x = (block_x * SIDE + member % SIDE) * STRIDE + (tile % STRIDE - shift_x) % STRIDE
     y = (block_y * SIDE + member // SIDE) * STRIDE + (tile // STRIDE - shift_y) % STRIDE
     return x, y
@@ -89,7 +95,7 @@ class WaveTiles:
     Pixels that a tile lacks, because they lie outside of the picture, are not in it.
     """
 
-    tile: Ints  # (n,) number of the tile of each path, from 0 on
+    tile: Ints  # (n,) number of the tile of each path, from 0 on, sample by sample
     member: Ints  # (n,) which member of the tile it is
     count: int  # number of tiles
 
@@ -97,11 +103,9 @@ class WaveTiles:
     def of(cls, pixel: Words, sample: Words, width: int) -> WaveTiles:
         """Return the tiles of paths, given pixels (n,) and samples (n,)."""
         tile, member = place_in_tiles(pixel, width)
-        key = (sample.astype(np.intp) << 32) | tile
-        order = np.argsort(key, kind="stable")
-        ordered = key.take(order)
-        number = np.empty(key.size, np.intp)
-        number[order] = np.cumsum(np.diff(ordered, prepend=ordered[:1]) != 0)
+        rank = np.cumsum(np.bincount(tile, minlength=1) > 0)  # from 1 on, among the tiles of the wave
+        in_turn = (sample - sample.min(initial=2**32 - 1)).astype(np.intp)
+        number = in_turn * rank[-1] + rank.take(tile) - 1
         return cls(number, member, int(number.max(initial=-1)) + 1)
 
     def grid(self, path: Ints, which: Ints | None = None) -> Ints:
