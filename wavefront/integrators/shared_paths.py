@@ -131,7 +131,7 @@ class Sharing:
         left.
         """
         leaving = [self._scatter(*way, bounce, L) for way in ways if len(way[0])]
-        if leaving and (bounce >= JOINED_AFTER or sum(map(len, leaving)) < FEW):
+        if len(leaving) > 1 and (bounce >= JOINED_AFTER or sum(map(len, leaving)) < FEW):
             leaving = [Paths.concatenate(leaving)]
         return [self._onward(paths, bounce, L) for paths in leaving]
 
