@@ -65,7 +65,10 @@ def broadcast(value: Any, n: int) -> NDArray[Any]:
 
 def dot(a: Floats, b: Floats) -> Floats:
     """Return dot products (n,) of vectors (3, n)."""
-    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+    out = a[0] * b[0]
+    out += a[1] * b[1]  # in place, which takes three quarters of the time
+    out += a[2] * b[2]
+    return out
 
 
 def cross(a: Floats, b: Floats) -> Floats:
