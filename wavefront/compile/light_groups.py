@@ -68,6 +68,10 @@ class GroupNumbers:
         """
         return self._number(group_name(f"{type(light).__name__} group", light.group))
 
+    def default(self) -> int:
+        """Return the number of the default group."""
+        return self._number(DEFAULT_GROUP)
+
     def of_shapes(self, shapes: Sequence[Mesh | CurvedShape]) -> Ints:
         """Return the group of each primitive of shapes; it is -1 of those that are dark."""
         numbers = [-1 if shape.emission is None else self._number(shape.material.group) for shape in shapes]

@@ -60,6 +60,7 @@ def gather_lights(
     half_size: Doubles,
     choice: str | LightSamplerMaker,
     mis: bool,
+    glowing: Sequence[LightRecord] = (),
 ) -> tuple[LightTable, LightGroups, Ints, int]:
     """Return the table of lights, their groups, and the light of each primitive and of rays that miss.
 
@@ -75,6 +76,8 @@ def gather_lights(
         Half of the scene's extent, (3,).
     choice, mis
         As for `compile_scene`.
+    glowing
+        The lights of media; they are the last ones before those at infinity, in the default group.
 
     Raises
     ------
@@ -110,6 +113,9 @@ def gather_lights(
     for part, number in surfaces:
         parts.append(part)
         groups.add(np.full(len(part[0]), number))
+    for record in glowing:
+        parts.append((record, None))
+        groups.add(np.array([groups.default()]))
     light_of, count = _lights_of_primitives(parts, primitives)
     kinds = [record for record, _ in parts]
     if infinite:

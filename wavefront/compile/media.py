@@ -13,8 +13,10 @@ from ..arrays.state import SurfaceInteraction
 from ..arrays.vec import Bools, Doubles, Floats, Ints, f4
 from ..bsdfs import Bsdf, BsdfSample
 from ..core.errors import SceneError, warn_caller
+from ..lights import GlowLights, LightRecord
 from ..materials import Material
 from ..media import BaseMedium, MediumRecord, PhaseFunction
+from ..media.grid import GridMedia
 from ..media.phase import deflected
 from ..shapes import Shape
 from ..textures.base import BaseTexture
@@ -81,6 +83,7 @@ class MediaTable:
     event_of: Ints  # (media,) what stands for a primitive where a path is scattered: -2 − its phase function
     scatters: Bools  # (media,)
     glows: bool  # any does
+    light_of: Ints  # (media,) number of the light that samples its emission, -1 for none
     bounds: Doubles  # (2, 3) corners of all that encloses anything, relative to the scene's center
 
     @property
@@ -119,6 +122,13 @@ class MediaTable:
         entry = self.entry_of.take(surface.material)
         around = self.highest(np.where(surface.back_facing, without(stack, entry), stack))
         return np.where(self.nested.take(entry), self.index.take(around), f4(1))
+
+    def holding(self, light: Ints, lights: int) -> Ints:
+        """Return the media (n,) that lights (n,), of so many `lights`, are samples of; -1 for none."""
+        held = np.full(lights + 1, -1)
+        held[self.light_of] = np.arange(len(self.light_of))
+        held[-1] = -1
+        return held.take(light)
 
     def by_record(self, medium: Ints) -> Iterator[tuple[MediumRecord, Ints, Ints]]:
         """Yield each record that occurs among media (n,), the lanes (k,) that it has, and their columns."""
@@ -233,10 +243,24 @@ def media_table(
         event_of=np.array([-2 - phases.index(id(m.phase)) if m.scatters else 0 for m in media], np.intp),
         scatters=np.array([medium.scatters for medium in media], np.bool_),
         glows=any(medium.glows for medium in media),
+        light_of=np.full(len(media), -1),
         bounds=np.stack([np.min(boxes, 0)[0], np.max(boxes, 0)[1]]) - center
         if boxes
         else np.array([[np.inf] * 3, [-np.inf] * 3]),
     )
+
+
+def glow_lights(media: MediaTable | None) -> tuple[list[LightRecord], Ints]:
+    """Return the lights of media on grids that glow, and the numbers (k,) of the media."""
+    if media is None:
+        return [], np.zeros(0, np.intp)
+    lights, numbers = list[LightRecord](), []
+    for number, (which, column) in enumerate(zip(media.record_of, media.column_of, strict=True)):
+        record = media.records[which]
+        if isinstance(record, GridMedia) and record.glows[column]:
+            lights.append(GlowLights.of(record, int(column)))
+            numbers.append(number)
+    return lights, np.array(numbers, np.intp)
 
 
 def _check_apart(shapes: Sequence[Shape]) -> None:

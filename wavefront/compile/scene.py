@@ -32,7 +32,7 @@ from .materials import (
     number_materials,
     opacity_table,
 )
-from .media import MediaTable, media_of, media_table, phase_materials
+from .media import MediaTable, glow_lights, media_of, media_table, phase_materials
 from .morton import MortonGrid
 from .scale import check_distance, check_lights, length_factor, scaled_shapes
 from .shape_numbers import ShapeNumbers, number_shapes
@@ -150,11 +150,16 @@ def compile_scene(
     around = None if scene.medium is None else scene.medium.scaled(scale)
     filled = media_of(user_materials, around)
     media = media_table(around, placed, user_materials, filled, center)
+    glowing, of_media = glow_lights(media)
     phases = phase_materials(filled)
     user_materials += phases
     lights, groups, light_of, environment = gather_lights(
-        scene, scaled, scale, meshes, curved, vertices, center, (high - low) / 2, light_sampler, mis
+        scene, scaled, scale, meshes, curved, vertices, center, (high - low) / 2, light_sampler, mis, glowing
     )
+    if media is not None and glowing:
+        media.light_of[of_media] = (
+            len(lights) - int(environment >= 0) - len(glowing) + np.arange(len(glowing))
+        )
     read = sorted({*attributes_read(placed), *lights.reads})
     attributes = {name: corner_values(name, meshes) for name in read}
     table_of_curved = CurvedTable.of(curved, center)

@@ -41,7 +41,7 @@ def intersect_and_compact(
     if paths.sensor is not None:
         return paths, at_sensors(paths)
     hits, left = intersect(scene, paths), paths.exclude_prim
-    paths, hits = alpha_pass_through(scene, paths, hits, sampler, bounce)
+    paths, hits = alpha_pass_through(scene, paths, hits, sampler, bounce, mis)
     if paths.glow is not None:
         paths = collect_glow(L, paths)
     emission = without_caustics(scene, paths, left, hits, emitted(scene, paths, hits))

@@ -4,6 +4,7 @@ from .base import DeltaLight, Emitters, Light, LightRecord, LightSample, Receive
 from .directional import DirectionalLight, DirectionalLights, SunLight
 from .environment import ConstantEnvironment, Environment
 from .flux import with_flux
+from .glow import GlowLights
 from .ies import IESLight, IESLights
 from .image import ImageEnvironment
 from .infinite import EnvironmentSum, InfiniteLight
@@ -27,6 +28,7 @@ __all__ = [
     "Emitters",
     "Environment",
     "EnvironmentSum",
+    "GlowLights",
     "IESLight",
     "IESLights",
     "ImageEnvironment",

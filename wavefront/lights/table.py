@@ -119,6 +119,10 @@ class LightTable:
             pdf[rows] = lit_for(kind, receiver, rows).pdf_li(take(point, rows), take(wi, rows))
         return pdf * self._choice_for(receiver).pmf(light, point)
 
+    def pmf(self, light: Ints, point: Floats, receiver: Receiver | None = None) -> Floats:
+        """Return the probability (n,) with which lights (n,) are chosen at points (3, n)."""
+        return self._choice_for(receiver).pmf(light, point)
+
     def _choice_for(self, receiver: Receiver | None) -> LightSampler:
         """Return the light sampler, for surfaces if they are known."""
         assert self.choice is not None

@@ -36,6 +36,16 @@ class Flight(SoA):
     light: Floats | None = None  # (3, n) emitted on the way, as it arrives at the origin; None for none
 
 
+@soa
+class GlowWeights(SoA):
+    """What weighs emission that rays meet against light samples of it (multiple importance sampling)."""
+
+    ratio: Floats  # (n,) chance of the light over the density of the ray's direction; 0 for no light sample
+    before: (
+        Floats  # (n,) distance from where the light would be sampled to the origin of the ray, scene units
+    )
+
+
 class BaseMedium(Parametrized, ABC):
     """What fills the space inside shapes, or around them: absorbs, scatters and emits light."""
 
@@ -83,11 +93,13 @@ class MediumRecord(SoA, ABC):
         throughput: Floats,
         u: Floats,
         steps: StepNumbers | None,
+        weights: GlowWeights | None = None,
     ) -> Flight:
         """Choose with u (2, n) where light is scattered.
 
         `throughput` (3, n) is that of the paths: it tells which channels matter. The mean of `weight`, where
         light is scattered, is σs·transmittance·dt, and elsewhere the transmittance of the whole length.
+        `weights` are for media whose emission is sampled; others ignore them.
         """
 
     @abstractmethod

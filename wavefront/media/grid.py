@@ -15,7 +15,7 @@ from ..colors.spectrum import blackbody_colors
 from ..core.errors import SceneError, as_array, finite_array, number
 from ..core.parameter import Parameter, parametrized
 from ..sampling.steps import StepNumbers
-from .base import BaseMedium, Flight, MediumRecord, channel_shares
+from .base import BaseMedium, Flight, GlowWeights, MediumRecord, channel_shares
 from .marching import March, optical_depth
 from .medium import _albedo, _coefficient, _scale
 from .phase import PhaseFunction, phase_or_isotropic
@@ -24,6 +24,8 @@ from .voxels import Voxels, bounds_in_cells
 MOST_CELLS = 64  # of majorants along an axis
 EVENT_COST = 3.0  # time of an event over that of a cell
 GLOW_EVENTS = 4.0  # least mean number of events over the box where anything glows
+AIMED_CELLS = 32  # along the longest axis, by which points of what glows are chosen
+RAY_POINTS = 2.0  # light samples that a ray through what glows counts for
 FAINT = f4(0.1)  # transmittance below which shadow rays are ended at random
 
 
@@ -194,6 +196,7 @@ class GridMedium(BaseMedium):
         albedo = self.albedo if self.albedo is not None and self.albedo.ndim == 4 else np.ones((1, 1, 1, 3))
         glow = np.zeros((1, 1, 1, 3)) if self.glow_grid is None else self.glow_grid
         low, high = self._majorants(extinction)
+        aim, rate = self._aim(glow)
         return GridMedia(
             density=Voxels.of(self.density),
             albedo=Voxels.of(albedo.astype(f4)),
@@ -203,6 +206,8 @@ class GridMedium(BaseMedium):
             extinction=extinction,
             scattering=self.sigma_s,
             shine=self.glow,
+            aim=Voxels.of(aim),
+            points_on_ray=np.array([rate], f4),
             scatters=np.array([self.scatters]),
             glows=np.array([self.glows]),
         )
@@ -246,6 +251,26 @@ class GridMedium(BaseMedium):
         # bounds hold after rounding too
         return best[1] * (gray * (1 - 1e-6)), np.minimum(best[2] * (1 + 1e-6), FLOAT32_MAX)
 
+    def _aim(self, glow: Floats) -> tuple[Floats, float]:
+        """Return the density (d, h, w) of points that are chosen for light samples, and points per length.
+
+        It is in proportion to the emission in the cells of a coarse grid; per volume, over points per length.
+        """
+        if not self.glows:
+            return np.zeros((1, 1, 1), f4), 1.0
+        density = self.density if self.density.ndim == 4 else self.density[..., None]
+        sizes = np.maximum(density.shape[:3], glow.shape[:3])
+        cells = tuple(int(each) for each in np.clip(np.rint(sizes * AIMED_CELLS / sizes.max()), 1, sizes))
+        assert len(cells) == 3
+        total = np.zeros(cells)
+        for field in ((density * self.glow[:, 0].astype(np.float64)).mean(-1), glow.mean(-1)):
+            parts = [bounds_in_cells(each, cells, np.add) for each in (field, np.ones(field.shape))]
+            total += parts[0] / parts[1]
+        share = total / total.sum()
+        volume = abs(np.linalg.det(self.transform[:3, :3])) / share.size
+        rate = RAY_POINTS / float((volume / (share**2).sum()) ** (1 / 3))
+        return (share / (volume * rate)).astype(f4), rate
+
 
 @soa
 class GridMedia(MediumRecord):
@@ -261,6 +286,8 @@ class GridMedia(MediumRecord):
     extinction: Floats  # (3, k) where the density is 1, per scene unit
     scattering: Floats  # (3, k)
     shine: Floats  # (3, k) emission
+    aim: Voxels  # density of light samples in coarse cells, per volume, over `points_on_ray`
+    points_on_ray: Floats  # (k,) per scene unit, light samples that a ray through what glows counts for
     scatters: Bools  # (k,)
     glows: Bools  # (k,)
 
@@ -273,6 +300,7 @@ class GridMedia(MediumRecord):
         throughput: Floats,
         u: Floats,
         steps: StepNumbers | None,
+        weights: GlowWeights | None = None,
     ) -> Flight:
         """Follow the rays from event to event of a rate that bounds the extinction (delta tracking).
 
@@ -301,8 +329,12 @@ class GridMedia(MediumRecord):
             part = take(weight, row)
             density = self.density.at(column, point)
             if light is not None:
-                glow = take(self.shine, column) * density + self.glow.at(column, point)
-                light[:, row] += part * (glow / rate)
+                glow = self.emission(column, point, density) / rate
+                if weights is not None:
+                    away = weights.before.take(row) + march.entry.take(lanes) + march.t.take(lanes)
+                    rival = weights.ratio.take(row) * self.aim.cell_at(column, point) * (away * away)
+                    glow = glow / (f4(1) + rival * rival)  # the power heuristic
+                light[:, row] += part * glow
             met = np.minimum(take(self.extinction, column) * density / rate, f4(1))
             scatters = self.scatters.take(column)
             ends = dot(channel_shares(take(throughput, row) * part), met) * scatters
@@ -350,6 +382,10 @@ class GridMedia(MediumRecord):
                 march = march.take(np.flatnonzero(inside))
             step += 1
         return part * exp(-control * take(self.extinction / strongest, number))
+
+    def emission(self, number: Ints, point: Floats, density: Floats) -> Floats:
+        """Return what is emitted per scene unit, (3, n), at points (3, n) of the unit cube."""
+        return take(self.shine, number) * density + self.glow.at(number, point)
 
     def _march(
         self,

@@ -16,7 +16,7 @@ from ..core.errors import SceneError, number
 from ..core.parameter import Parameter, parametrized
 from ..sampling.steps import StepNumbers
 from ..textures.base import BaseTexture
-from .base import BaseMedium, Flight, MediumRecord, channel_shares, chosen_channel
+from .base import BaseMedium, Flight, GlowWeights, MediumRecord, channel_shares, chosen_channel
 from .phase import PhaseFunction, phase_or_isotropic
 
 THIN = f4(0.05)  # optical depth below which 1 − exp(−x) is a series
@@ -143,6 +143,7 @@ class HomogeneousMedia(MediumRecord):
         throughput: Floats,
         u: Floats,
         steps: StepNumbers | None,
+        weights: GlowWeights | None = None,
     ) -> Flight:
         """Choose a channel with u[0] and a distance in it with u[1]; weigh by the densities of all channels.
 

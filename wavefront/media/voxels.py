@@ -63,9 +63,19 @@ class Voxels(SoA):
         near = lines[0] + (lines[1] - lines[0]) * part[1]
         return near + (lines[2] + (lines[3] - lines[2]) * part[1] - near) * part[2]
 
+    def cell_at(self, number: Ints, point: Floats) -> Floats:
+        """Return the value (n,) of the one channel in the voxels with points (3, n), not interpolated."""
+        size = take(self.size, number)
+        cell = np.minimum(np.maximum(point * size.astype(f4), f4(0)).astype(np.intp), size - 1)
+        return self.values[0].take(
+            self.first.take(number) + cell[0] + size[0] * (cell[1] + size[1] * cell[2])
+        )
+
 
 def bounds_in_cells(grid: NDArray[Any], cells: tuple[int, int, int], extreme: np.ufunc) -> NDArray[Any]:
     """Return the greatest or least value (d, h, w) that interpolation reaches in each of a cube's cells.
+
+    With `np.add` it is the sum of the voxels that matter there.
 
     Parameters
     ----------
@@ -74,7 +84,7 @@ def bounds_in_cells(grid: NDArray[Any], cells: tuple[int, int, int], extreme: np
     cells
         (d, h, w): along z, y and x.
     extreme
-        `np.maximum` or `np.minimum`.
+        `np.maximum`, `np.minimum` or `np.add`.
     """
     for axis, (count, size) in enumerate(zip(cells, grid.shape, strict=True)):
         edges = np.arange(count + 1) * (size / count) - 0.5

@@ -27,11 +27,11 @@ COVERING = f4(0.5)  # opacity from which on a surface hides what is behind it, w
 
 
 def alpha_pass_through(
-    scene: CompiledScene, paths: Paths, hits: Hits, sampler: Sampler, bounce: int
+    scene: CompiledScene, paths: Paths, hits: Hits, sampler: Sampler, bounce: int, mis: bool = False
 ) -> tuple[Paths, Hits]:
     """Move paths on through the surfaces that they pass, to the first surface that they hit.
 
-    Media on the way may scatter them before.
+    Media on the way may scatter them before. With `mis` what these emit is weighted against light samples.
 
     Afterwards `origin` is behind the last surface that a path has passed, and `prev_vertex` is where it
     scattered last. Each of the surfaces along a ray has a random number of its own.
@@ -62,7 +62,7 @@ def alpha_pass_through(
             most = len(numbers_of(Dimension.OPACITY))
             raise RenderError(f"a ray meets more than {most} surfaces with an opacity below 1")
         if media is not None:
-            lanes = fly(scene, paths, hits, lanes, sampler, bounce, dimension - Dimension.OPACITY)
+            lanes = fly(scene, paths, hits, lanes, sampler, bounce, dimension - Dimension.OPACITY, mis)
             lanes = _passable(scene, paths, hits, lanes, catches)
             if not lanes.size:
                 break

@@ -25,6 +25,7 @@ class ShadowRays(Rays):
     cos_light: Floats  # (n,) cosine between the ray and the light's normal; 1 where it has none
     media: Any = None  # (4, n) as of `Paths`
     steps: StepNumbers | None = None  # for media that need them
+    goal: Ints | None = None  # (n,) medium in which the light is, -1 for none; None where none is in one
 
 
 def intersect(scene: CompiledScene, rays: Rays) -> Hits:

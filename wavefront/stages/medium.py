@@ -8,9 +8,10 @@ import numpy as np
 
 from ..arrays.elementary import exp
 from ..arrays.state import Hits, Paths, Rays, SurfaceInteraction
-from ..arrays.vec import Bools, Floats, Ints, take
+from ..arrays.vec import TINY, Bools, Floats, Ints, dot, f4, take
 from ..compile.media import crossed
 from ..compile.scene import CompiledScene
+from ..media.base import GlowWeights
 from ..sampling.sampler import Dimension, Sampler
 from ..sampling.steps import StepNumbers
 
@@ -29,9 +30,18 @@ def absorb(scene: CompiledScene, throughput: Floats, hits: Hits, surface: Surfac
 
 
 def fly(
-    scene: CompiledScene, paths: Paths, hits: Hits, lanes: Ints, sampler: Sampler, bounce: int, segment: int
+    scene: CompiledScene,
+    paths: Paths,
+    hits: Hits,
+    lanes: Ints,
+    sampler: Sampler,
+    bounce: int,
+    segment: int,
+    mis: bool,
 ) -> Ints:
     """Let some lanes (k,) fly through their media, in place; return those that reach their surfaces.
+
+    With `mis` the light that media emit is weighted against light samples.
 
     Those that are scattered before have `MediaTable.event_of` in place of a primitive, at that distance.
     """
@@ -58,6 +68,7 @@ def fly(
             throughput,
             take(u, rows),
             None if steps is None else steps.take(rows),
+            _glow_weights(scene, paths, at, medium.take(rows)) if mis else None,
         )
         if flight.light is not None and paths.glow is not None:
             paths.glow[:, at] += throughput * flight.light
@@ -67,6 +78,35 @@ def fly(
         hits.prim[at.take(met)] = media.event_of.take(medium.take(rows.take(met)))
         reached[inside.take(rows.take(met))] = False
     return lanes.compress(reached)
+
+
+def _glow_weights(scene: CompiledScene, paths: Paths, lanes: Ints, medium: Ints) -> GlowWeights | None:
+    """Return the weights of what media (k,) emit along some lanes (k,); None where all count in full."""
+    assert scene.media is not None
+    light = scene.media.light_of.take(medium)
+    sampled = np.flatnonzero((light >= 0) & ~take(paths.specular, lanes))
+    if not sampled.size:
+        return None
+    at = lanes.take(sampled)
+    origin, start = (
+        take(paths.origin, lanes),
+        paths.origin if paths.prev_vertex is None else paths.prev_vertex,
+    )
+    receiver = None if paths.left_receiver is None else paths.left_receiver.take(at)
+    chance = scene.lights.pmf(light.take(sampled), take(start, at), receiver)
+    ratio = np.zeros(lanes.size, f4)
+    ratio[sampled] = chance / np.maximum(take(paths.pdf, at), TINY)
+    return GlowWeights(ratio, dot(origin - take(start, lanes), take(paths.direction, lanes)))
+
+
+def arrives(scene: CompiledScene, stack: Any, goal: Any) -> Bools | None:
+    """Return whether rays that end with stacks (4, n) are within the media (n,) where they should end.
+
+    A goal is -1 for rays that end anywhere. None is returned where there is no goal.
+    """
+    if scene.media is None or goal is None:
+        return None
+    return (goal < 0) | (scene.media.medium_in(stack) == goal)
 
 
 def transmitted(

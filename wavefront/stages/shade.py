@@ -281,6 +281,8 @@ def direct(
     rays = shadow_rays(shade.surface, origin, light, lanes)
     if scene.media is not None and paths.media is not None:
         rays.media = take(shade.stacks(paths.media[:, :n], cos_g), lanes)
+        if (scene.media.light_of >= 0).any():
+            rays.goal = scene.media.holding(take(number, lanes), len(scene.lights))
         if scene.media.takes_steps:
             which = take(address[0], lanes), take(address[1], lanes)
             rays.steps = StepNumbers.of(sampler.seed, *which, bounce, Dimension.TRANSMITTANCE)

@@ -12,7 +12,7 @@ from ..arrays.vec import ALL, Bools, Floats, Lanes, dot, f4, take
 from ..compile.scene import CompiledScene
 from .interaction import interaction, material_rows, offset_origin
 from .intersect import ShadowRays, intersect, shadow_ray_length, visible
-from .medium import absorb, cross, hidden, transmitted
+from .medium import absorb, arrives, cross, hidden, transmitted
 
 AnyRays = TypeVar("AnyRays", bound=Rays)
 
@@ -28,6 +28,9 @@ def transmittance_along(scene: CompiledScene, rays: ShadowRays) -> Floats:
         lanes = np.flatnonzero(seen)
         free = rays.take(lanes)
         part[:, lanes] = transmitted(scene, free, free.media, free.distance, free.steps)
+        there = arrives(scene, free.media, free.goal)
+        if there is not None:
+            part[:, lanes.compress(~there)] = 0
     lanes = np.flatnonzero(~seen)
     rays = rays.take(lanes)
     while lanes.size:
@@ -38,6 +41,9 @@ def transmittance_along(scene: CompiledScene, rays: ShadowRays) -> Floats:
         if rays.media is not None:
             length = np.where(between, hits.t, rays.distance)
             part[:, lanes] *= transmitted(scene, rays, rays.media, length, rays.steps)
+            there = arrives(scene, rays.media, rays.goal)
+            if there is not None:
+                part[:, lanes.compress(~between & ~there)] = 0
         met = np.flatnonzero(between & passes)
         lanes, rays, hits = lanes.take(met), rays.take(met), hits.take(met)
         surface = interaction(scene, rays, hits)
