@@ -71,6 +71,19 @@ def test_a_white_surface_loses_nothing(name: str) -> None:
         assert abs(energy.mean() - 1) < WITHIN + limit * error, (vars(bsdf), mu)
 
 
+@pytest.mark.parametrize(("along", "across"), [(1.0, 0.1), (0.3, 0.9), (0.8, 0.5)])
+def test_a_brushed_white_metal_by_texture_loses_and_gains_a_tenth_at_most(
+    along: float, across: float
+) -> None:
+    """Its table is that of one roughness, which masks about as much as both."""
+    rng = np.random.default_rng(3)
+    metal = Conductor(1e-6, 1e4, Constant(along), roughness_v=across)
+    for mu in (1.0, 0.5, 0.05):
+        for turn in (0.0, 0.8, 1.57):
+            energy = energies(metal, toward(mu, turn, 4 * SAMPLES), False, rng)[0]
+            assert energy.mean() == pytest.approx(1, abs=0.1 + 3 * energy.std() / 200)
+
+
 def test_single_scattering_loses_light() -> None:
     rng = np.random.default_rng(0)
     wo = toward(1.0, 0.0, SAMPLES)

@@ -76,7 +76,8 @@ class Loss(NamedTuple):
 
     def at(self, bsdf: Microfacets, w: Floats, inside: Bools) -> Floats:
         """Return L of directions w (3, n) on the inside or not, (n,)."""
-        return _directional(bsdf, self.lost, _place_of_refraction(bsdf.facets(), w), inside)
+        place = _place_of_refraction(bsdf.facets(), w)
+        return _directional(bsdf, self.lost, place, bsdf.mean_roughness, inside)
 
     def lobe(
         self, bsdf: Microfacets, wo: Floats, wi: Floats, inside: Bools, chance: Floats | None = None
@@ -102,7 +103,7 @@ class Loss(NamedTuple):
 
     def _sides(self, bsdf: Microfacets, inside: Bools) -> tuple[Floats, Floats, Floats]:
         """Return the means here and beyond, and the part of the lobe that is beyond the boundary."""
-        here, beyond = (_of_roughness(bsdf, self.means, side) for side in (inside, ~inside))
+        here, beyond = (_of_roughness(self.means, bsdf.mean_roughness, side) for side in (inside, ~inside))
         return here, beyond, f4(self.passed) * np.minimum(here, beyond) / here
 
 
@@ -115,7 +116,8 @@ def mean_over_cosines(reflectance: Callable[[Floats], Floats]) -> Floats:
 def gain(bsdf: Microfacets, wo: Floats, wi: Floats, mean_reflectance: Floats | None = None) -> Floats:
     """Return by how much reflection grows, (n,); of a metal with a mean reflectance (3, n)."""
     table, facets = scaling(bsdf.shape).factor, bsdf.facets()
-    one, other = (_directional(bsdf, table, _place_of_masking(facets, w)) for w in (wo, wi))
+    places = (_place_of_masking(facets, w) for w in (wo, wi))
+    one, other = (_directional(bsdf, table, place, bsdf.masking_roughness) for place in places)
     if mean_reflectance is None:
         return one * other
     return f4(1) + (one * other - f4(1)) * part_kept(bsdf, mean_reflectance)
@@ -126,7 +128,7 @@ def part_kept(bsdf: Microfacets, mean_reflectance: Floats) -> Floats:
 
     It is F·M/(1 − F·(1 − M)), with M the mean albedo of single scattering (Kulla and Conty).
     """
-    mean = _of_roughness(bsdf, scaling(bsdf.shape).albedo)
+    mean = _of_roughness(scaling(bsdf.shape).albedo, bsdf.masking_roughness)
     return mean_reflectance * mean / (f4(1) - mean_reflectance * (f4(1) - mean))
 
 
@@ -141,20 +143,22 @@ def _place_of_refraction(facets: Facets, w: Floats) -> Place:
     return facets.turn(w), np.sqrt(np.minimum(f4(0.5) * (z + z / facets.stretched(w)), f4(1)))
 
 
-def _directional(bsdf: Microfacets, table: Floats, place: Place, side: Bools | int = 0) -> Floats:
+def _directional(
+    bsdf: Microfacets, table: Floats, place: Place, roughness: Callable[[], Floats], side: Bools | int = 0
+) -> Floats:
     """Return what a table (sides, rows, columns) has for directions at a place, (n,)."""
     turn, column = place
     if table.shape[1] == 1:
         nearest = (column * f4(FINE - 1) + f4(0.5)).astype(np.intp)
         return table.ravel().take(nearest + side * FINE)
-    return interpolate(table, bsdf.mean_roughness() if bsdf.shape.alpha is None else turn, column, side)
+    return interpolate(table, roughness() if bsdf.shape.alpha is None else turn, column, side)
 
 
-def _of_roughness(bsdf: Microfacets, table: Floats, side: Bools | int = 0) -> Floats:
-    """Return what a table (sides, r) has for the roughness, (n,) or (1,)."""
+def _of_roughness(table: Floats, roughness: Callable[[], Floats], side: Bools | int = 0) -> Floats:
+    """Return what a table (sides, r) has for a roughness, (n,) or (1,)."""
     if table.shape[1] == 1:
         return table.ravel().take(np.atleast_1d(side).astype(np.intp))
-    return interpolate(table[:, None], None, bsdf.mean_roughness(), side)
+    return interpolate(table[:, None], None, roughness(), side)
 
 
 @cache

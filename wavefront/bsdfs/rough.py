@@ -84,8 +84,15 @@ class Microfacets(JointBsdf):
         self.shape = Shape(alpha, alpha_v, self.distribution == "beckmann", self.shadowing == "separable")
 
     def mean_roughness(self) -> Floats:
-        """Return a roughness whose lobe has about the albedo of this one."""
+        """Return a roughness whose lobe has about the albedo of this one, with Fresnel's equations."""
         return self.roughness if self.roughness_v is None else np.sqrt(self.roughness * self.roughness_v)
+
+    def masking_roughness(self) -> Floats:
+        """Return a roughness that masks about as much as both: that of the root mean square of α."""
+        if self.roughness_v is None:
+            return self.roughness
+        along, across = self.roughness * self.roughness, self.roughness_v * self.roughness_v
+        return np.sqrt(np.sqrt(f4(0.5) * (along * along + across * across)))
 
     def facets(self) -> Facets:
         """Return the microfacets; unbound, their tangent is the x axis."""
