@@ -6,9 +6,10 @@ from typing import Any
 
 import numpy as np
 
-from ..arrays.vec import Bools, Doubles, Floats, Ints, cross, dot, f4, length
+from ..arrays.vec import ALL, Bools, Doubles, Floats, Ints, Lanes, cross, dot, f4, length, take
 from ..core.errors import SceneError
 from . import triangle
+from .balls import bounding_balls
 from .base import Geometry, Intersections
 from .coplanar import Overlaps, find_overlaps
 from .duplicates import that_can_be_hit
@@ -63,6 +64,7 @@ class EmbreeAccelerator:
         if any(map(len, geometry.curved)):
             self._first_curved = len(triangles)
             self._curved = NumpyAccelerator(Geometry(np.zeros((0, 3, 3), f4), geometry.curved))
+            self._balls = bounding_balls(geometry.curved)
 
     def __reduce__(self) -> tuple[type[EmbreeAccelerator], tuple[Geometry]]:
         """Pickle what it was built from: Embree's own memory cannot be pickled."""
@@ -74,10 +76,12 @@ class EmbreeAccelerator:
         if self._overlapping is not None:
             self._overlapping.find_first(origin, direction, exclude_prim, hits)
         if self._curved is not None:
-            on_curved = self._curved.closest(origin, direction, self._exclude_curved(exclude_prim))
-            nearer = np.flatnonzero(on_curved.t < hits.t)
-            hits.t[nearer] = on_curved.t.take(nearer)
-            hits.prim[nearer] = on_curved.prim.take(nearer) + self._first_curved
+            rays, lanes = self._near_curved(origin, direction, exclude_prim)
+            on_curved = self._curved.closest(*rays)
+            some = np.flatnonzero(on_curved.t < take(hits.t, lanes))
+            nearer = some if isinstance(lanes, slice) else lanes.take(some)
+            hits.t[nearer] = on_curved.t.take(some)
+            hits.prim[nearer] = on_curved.prim.take(some) + self._first_curved
             hits.b1[nearer] = hits.b2[nearer] = 0
         return hits
 
@@ -85,11 +89,17 @@ class EmbreeAccelerator:
         """Return a mask (n,): which rays hit anything at 0 < t < `distance` (n,)."""
         blocked = self._occluded_by_triangle(origin, direction, distance, exclude_prim)
         if self._curved is not None:
-            blocked |= self._curved.occluded(origin, direction, distance, self._exclude_curved(exclude_prim))
+            (start, along, left), lanes = self._near_curved(origin, direction, exclude_prim)
+            blocked[lanes] |= self._curved.occluded(start, along, take(distance, lanes), left)
         return blocked
 
-    def _exclude_curved(self, exclude_prim: Ints) -> Ints:
-        return np.where(exclude_prim >= self._first_curved, exclude_prim - self._first_curved, -1)
+    def _near_curved(
+        self, origin: Floats, direction: Floats, exclude_prim: Ints
+    ) -> tuple[tuple[Floats, Floats, Ints], Lanes]:
+        """Return those of rays (3, n) that may hit curved primitives, and which lanes they are."""
+        left = np.where(exclude_prim >= self._first_curved, exclude_prim - self._first_curved, -1)
+        lanes = ALL if self._balls is None else self._balls.near(origin, direction, left)
+        return (take(origin, lanes), take(direction, lanes), take(left, lanes)), lanes
 
     def _closest_triangle(self, origin: Floats, direction: Floats, exclude_prim: Ints) -> Intersections:
         """Return the nearest hits of triangles; rays that hit their excluded triangle are traced again."""

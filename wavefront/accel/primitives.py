@@ -14,7 +14,7 @@ from typing import Any, ClassVar, Protocol, Self
 import numpy as np
 
 from ..arrays.state import SoA
-from ..arrays.vec import Bools, Doubles, Floats, Ints
+from ..arrays.vec import Bools, Doubles, Floats, Ints, f4, length
 from ..shapes import CurvedShape
 from .bvh import Ball, RayBatch
 from .hits import HitAccumulator
@@ -74,6 +74,13 @@ class CurvedPrimitives(Primitives):
     """k primitives of one kind that are not triangles. Only their first two hits along a line count."""
 
     shapes: ClassVar[tuple[type[CurvedShape], ...]]  # the shapes that are made of such primitives
+
+    @property
+    def balls(self) -> tuple[Floats, Floats]:
+        """Centers (3, k) and radii (k,) of balls around the primitives: by default, around their boxes."""
+        low, high = self.bounds
+        center = (low + high) / 2
+        return center, length(np.maximum(high - center, center - low)) * f4(1 + 2.0**-20)
 
     @classmethod
     @abstractmethod

@@ -49,6 +49,11 @@ class SpherePrimitives(CurvedPrimitives):
         """Lower and upper corners, (3, k) each."""
         return self.centers - self.radii, self.centers + self.radii
 
+    @property
+    def balls(self) -> tuple[Floats, Floats]:
+        """The spheres: centers (3, k) and radii (k,)."""
+        return self.centers, self.radii
+
     def filter_rows(self, ball: Ball) -> Floats:
         """Return the rows (1, k, 11) of `sphere_rows`."""
         centers, radii = self.centers.astype(np.float64), self.radii.astype(np.float64)
