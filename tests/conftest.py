@@ -1,5 +1,6 @@
 """Settings of the whole suite."""
 
+import gc
 import os
 import signal
 from collections import Counter
@@ -36,8 +37,10 @@ settings.load_profile(os.environ.get("HYPOTHESIS_PROFILE", "deterministic"))
 def pytest_configure() -> None:
     """Let programs import modules of tests, and have Ctrl-C stop this process and its children.
 
-    A shell that starts the tests in the background has them ignore Ctrl-C.
+    A shell that starts the tests in the background has them ignore Ctrl-C. The garbage collector rests until
+    the tests are collected.
     """
+    gc.disable()
     paths = str(Path(__file__).parent), os.environ.get("PYTHONPATH")
     # modules of tests, for the programs that they run
     os.environ["PYTHONPATH"] = os.pathsep.join(filter(None, paths))
@@ -56,6 +59,12 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
             seen[name] += 1
             if seen[name] > marker.args[0]:
                 item.add_marker(pytest.mark.slow)
+
+
+def pytest_collection_finish() -> None:
+    """Leave the modules and tests out of what the garbage collector looks through during the tests."""
+    gc.freeze()
+    gc.enable()
 
 
 @pytest.fixture

@@ -252,9 +252,13 @@ DIRECT_CASES = [
             lambda x=x: _lit_floor(disk(1, 2), at=(x, 0, 0)),
             expected * ALBEDO / np.pi,
             naive_spp=16384,
-            later=() if x == 0 else ("naive", "full"),
+            later=tuple(each for each in ALL if each not in now),
         )
-        for x, expected in ((0, 0.628319), (1, 0.460076), (3, 0.080608))
+        for x, expected, now in (
+            (0, 0.628319, ("direct_mis", "full")),
+            (1, 0.460076, ("direct_mis",)),
+            (3, 0.080608, ("direct_simple",)),
+        )
     ),
     *(
         Case(
@@ -262,12 +266,12 @@ DIRECT_CASES = [
             lambda x=x, z=z: _lit_floor(panel((-1, -1), (1, 1), 1), at=(x, 0, z)),
             expected * ALBEDO / np.pi,
             spp=16384,
-            later=() if where == "center" else ("naive", "full"),
+            later=tuple(each for each in ALL if each not in now),
         )
-        for where, x, z, expected in (
-            ("center", 0, 0, 1.740840),
-            ("offset 0.5", 0.5, 0, 1.564202),
-            ("below a corner", 1, 1, 0.652688),
+        for where, x, z, expected, now in (
+            ("center", 0, 0, 1.740840, ("naive", "direct_mis", "full")),
+            ("offset 0.5", 0.5, 0, 1.564202, ("direct_simple",)),
+            ("below a corner", 1, 1, 0.652688, ("direct_mis",)),
         )
     ),
     Case(
@@ -284,7 +288,7 @@ DIRECT_CASES = [
         lambda: _half_hidden(panel((-1, -1), (1, 1), 1), 0.5),
         0.870420 * ALBEDO / np.pi,
         spp=16384,
-        later=("naive", "direct_mis"),
+        later=("naive", "direct_mis", "full"),
     ),
     Case("half-hidden sphere", lambda: _half_hidden(_black_sphere((0, 2, 0)), 1), 0.098175 * ALBEDO / np.pi),
     Case(
@@ -292,7 +296,7 @@ DIRECT_CASES = [
         lambda: _half_hidden(disk(1, 2), 1),
         0.628319 / 2 * ALBEDO / np.pi,
         naive_spp=16384,
-        later=("naive", "full"),
+        later=("naive", "direct_simple", "full"),
     ),
 ]
 TRIANGLE_CASES = [
@@ -303,6 +307,7 @@ TRIANGLE_CASES = [
         spp=16384,
         naive_spp=32768,
         max_error=0.001,
+        later=ALL[number % 2 :: 2],
     )
     for number, (expected, corners) in enumerate(NORI_TRIANGLES, 1)
 ]

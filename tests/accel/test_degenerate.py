@@ -32,22 +32,35 @@ def quad(material, vertices=PLACES, uvs=PLACES[:, :2], **arguments):
     return wf.Mesh(vertices, FACES, uvs=uvs, material=material, **arguments)
 
 
-def check(*shapes, size=1.0):
-    """Render shapes around the origin in two lights, by light and BSDF samples."""
-    camera = wf.Camera.look_at((0.6 * size, 0.7 * size, 2 * size), (0.5 * size, 0.5 * size, 0), size=(8, 8))
-    for light in (wf.Environment(1.0), wf.PointLight((size, size, size), size * size)):
-        image = render(wf.Scene(list(shapes), [light], camera), 2)
-        assert np.isfinite(image.rgb).all()
-        assert image.metadata["bad_samples"] == 0
+def check(*shapes, size=1.0, columns=1, rows=1):
+    """Render shapes around the origin in light that only light samples find, and in light that both find."""
+    target = np.array([0.5 * columns, 0.5 * rows, 0]) * size
+    camera = wf.Camera.look_at(
+        target + np.array([0.1, 0.2, 2 * rows]) * size, target, size=(8 * columns, 8 * rows)
+    )
+    lights = [wf.Environment(1.0), wf.PointLight(target + size / 2, rows * size * size)]
+    image = render(wf.Scene(list(shapes), lights, camera), 4)
+    assert np.isfinite(image.rgb).all()
+    assert image.metadata["bad_samples"] == 0
 
 
-@pytest.mark.parametrize("material", MATERIALS.values(), ids=MATERIALS)
+def check_each(*arguments):
+    """Render a quad of each material, a row, with each of the arguments, a column, in one picture."""
+    check(
+        *(
+            quad(material, PLACES + np.array([column, row, 0]), **each)
+            for column, each in enumerate(arguments)
+            for row, material in enumerate(MATERIALS.values())
+        ),
+        columns=len(arguments),
+        rows=len(MATERIALS),
+    )
+
+
 @pytest.mark.parametrize("normals", [None, LEANING], ids=["flat", "smooth"])
 @pytest.mark.parametrize("axes", [[1, 1], [1, 0], [0, 1]], ids=["uv", "u", "v"])
-def test_texture_coordinates_that_span_hardly_any_area(material, normals, axes):
-    for tiny in TINY:
-        narrow = PLACES[:, :2] * np.where(axes, tiny, 1)
-        check(quad(material, uvs=narrow, normals=normals))
+def test_texture_coordinates_that_span_hardly_any_area(normals, axes):
+    check_each(*({"uvs": PLACES[:, :2] * np.where(axes, tiny, 1), "normals": normals} for tiny in TINY))
 
 
 @pytest.mark.parametrize("normal_map", [NORMALS, BUMPS], ids=["normals", "heights"])
@@ -63,10 +76,8 @@ def test_a_normal_map_without_tangents_tilts_nothing(normal_map):
         assert np.array_equal(plain, carved)
 
 
-@pytest.mark.parametrize("material", MATERIALS.values(), ids=MATERIALS)
-def test_large_texture_coordinates(material):
-    for large in (1e5, 1e19, 3e38):
-        check(quad(material, uvs=PLACES[:, :2] * large, normals=UP))
+def test_large_texture_coordinates():
+    check_each(*({"uvs": PLACES[:, :2] * large, "normals": UP} for large in (1e5, 1e19, 3e38)))
 
 
 def test_texture_coordinates_beyond_float32_are_named():
@@ -76,13 +87,11 @@ def test_texture_coordinates_beyond_float32_are_named():
         quad(wf.Diffuse(0.5), uvs1=PLACES[:, :2] * -1e300)
 
 
-@pytest.mark.parametrize("material", MATERIALS.values(), ids=MATERIALS)
-def test_normals_and_tangents_of_any_length(material):
+def test_normals_and_tangents_of_any_length():
     """Only their directions count; of those without a length, the face's."""
-    for size in (0.0, 1e-300, 1e-30, 1e39, 1e308):
-        check(quad(material, normals=LEANING * size))
-        tangents = np.tile([size, 0, 0, 1], (4, 1))
-        check(quad(material, normals=UP, tangents=tangents))
+    sizes = (0.0, 1e-300, 1e-30, 1e39, 1e308)
+    check_each(*({"normals": LEANING * size} for size in sizes))
+    check_each(*({"normals": UP, "tangents": np.tile([size, 0, 0, 1], (4, 1))} for size in sizes))
 
 
 def test_the_length_of_normals_changes_no_bit():

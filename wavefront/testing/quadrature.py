@@ -79,8 +79,9 @@ class DensityIntegrator:
 
     def cells(self, cells: Cells, tolerance: float = 1e-5) -> tuple[Doubles, float]:
         """Return the integral over each cell, (ROWS·COLUMNS,), and the error left in their sum."""
-        boxes, owner = self._around_samples(cells.rectangles(), cells.find(self.guide))
-        home = self._locate(boxes, owner, cells.find(self.guide))
+        cell = cells.find(self.guide)
+        boxes, owner = self._around_samples(cells.rectangles(), cell)
+        home = self._locate(boxes, owner, cell)
         total = np.zeros(ROWS * COLUMNS)
         coarse, _, across, _ = self._quadrature(boxes)
         unresolved = 0.0
