@@ -456,6 +456,7 @@ SPECULAR_CASES = [
             expected,
             ALL if degrees == 45 else ("full",),
             naive_spp=1024,
+            later=() if degrees == 45 else ALL,
         )
         for degrees, expected in (
             (0, 0.04),
@@ -476,6 +477,7 @@ SPECULAR_CASES = [
             ETA2 * (1 - expected),
             ALL if degrees == 30 else ("full",),
             naive_spp=1024,
+            later=() if degrees == 10 else ALL,
         )
         for degrees, expected in ((10, 0.040083), (30, 0.055190), (40, 0.245291))
     ),
@@ -484,6 +486,7 @@ SPECULAR_CASES = [
         lambda: through_glass(45, 28.125506),
         (1 - 0.050240) / ETA2,
         naive_spp=1024,
+        later=("naive", "direct_simple", "direct_mis"),
     ),
     *(
         Case(
@@ -493,6 +496,7 @@ SPECULAR_CASES = [
             ALL if degrees == 45 else ("full",),
             spp=1024,
             naive_spp=1024,
+            later=() if degrees == 60 else ALL,
         )
         for degrees, expected in ((0, 0.68), (45, 0.672879), (60, 0.656533), (80, 0.658843))
     ),
@@ -503,6 +507,7 @@ SPECULAR_CASES = [
             expected,
             naive_spp=1024,
             options={"max_bounces": 128},
+            later=ALL,
         )
         for degrees, expected in ((0, 0.923077), (45, 0.904327))
     ),
@@ -512,6 +517,7 @@ SPECULAR_CASES = [
         0.9**10,
         spp=8192,
         options={"max_bounces": 10},
+        later=ALL,
     ),
 ]
 

@@ -45,7 +45,6 @@ def test_indirect_light(case: Case, integrator: str) -> None:
 
 
 @pytest.mark.parametrize(**each(scenes.SPECULAR_CASES))
-@pytest.mark.first(8)
 def test_specular_light(case: Case, integrator: str) -> None:
     """Glass, metal and mirrors, through which every integrator sees.
 
