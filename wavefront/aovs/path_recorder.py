@@ -2,10 +2,24 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 from ..arrays.state import Contribution, Hits, Paths
 from ..arrays.vec import Floats, Ints
 from ..compile.scene import CompiledScene
 from ..stages.shade import Shading
+
+
+@dataclass(frozen=True, slots=True)
+class MetSurfaces:
+    """What the paths of a wave meet."""
+
+    bounce: int
+    paths: Paths
+    hits: Hits
+    kept: Ints  # (k,) lanes that go on
+    kept_paths: Paths  # those, as they will be shaded
+    kept_hits: Hits
 
 
 class PathRecorder:
@@ -32,27 +46,8 @@ class PathRecorder:
         """Return parts of the light, (3, n) of the samples, and (3, count) of the shared points."""
         return []
 
-    def record_hits(
-        self,
-        bounce: int,
-        scene: CompiledScene,
-        paths: Paths,
-        hits: Hits,
-        kept: Ints,
-        kept_paths: Paths,
-        kept_hits: Hits,
-    ) -> None:
-        """Record what paths meet next, after the light that they meet there.
-
-        Parameters
-        ----------
-        paths, hits
-            All paths.
-        kept
-            (k,) those that go on.
-        kept_paths, kept_hits
-            The same as records, as they will be shaded.
-        """
+    def record_hits(self, scene: CompiledScene, met: MetSurfaces) -> None:
+        """Record what paths meet next, after the light that they meet there."""
 
     def record_surfaces(self, scene: CompiledScene, paths: Paths, shade: Shading) -> None:
         """Record the surfaces that paths have met, which are ready to shade."""

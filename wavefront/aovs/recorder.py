@@ -22,7 +22,7 @@ from ..stages.compact import compact
 from ..stages.interaction import interaction
 from ..stages.normal_mapping import perturb_normals
 from ..stages.shade import Shading, shading
-from .path_recorder import PathRecorder
+from .path_recorder import MetSurfaces, PathRecorder
 
 FEATURES = ("denoising_albedo", "denoising_normal")
 OF_LIGHT = ("direct", "indirect", "light_groups", CLAMPED)
@@ -105,19 +105,10 @@ class SampleRecorder(PathRecorder):
 
     # --- Surfaces -------------------------------------------------------------------------------------
 
-    def record_hits(
-        self,
-        bounce: int,
-        scene: CompiledScene,
-        paths: Paths,
-        hits: Hits,
-        kept: Ints,
-        kept_paths: Paths,
-        kept_hits: Hits,
-    ) -> None:
+    def record_hits(self, scene: CompiledScene, met: MetSurfaces) -> None:
         """Record what paths meet next; see `PathRecorder`."""
         self._shade_awaited()
-        first, self._begun = not self._begun, True
+        (paths, hits), first, self._begun = (met.paths, met.hits), not self._begun, True
         if first and self._covered is not None:
             self._covered[paths.slot] = hits.prim != -1
         if first and self._coverage is not None:
@@ -125,14 +116,14 @@ class SampleRecorder(PathRecorder):
         if not self._needs_surfaces(paths, first):
             return
         ends = hits.prim != -1
-        ends[kept] = False
+        ends[met.kept] = False
         if ends.any():
             self._awaited = AwaitedSurfaces(
                 scene, *compact(scene, paths, hits, np.flatnonzero(ends)), first=first
             )
             self._shade_awaited()
-        if len(kept_paths):
-            self._awaited = AwaitedSurfaces(scene, kept_paths, kept_hits, first)
+        if len(met.kept_paths):
+            self._awaited = AwaitedSurfaces(scene, met.kept_paths, met.kept_hits, first)
 
     def record_surfaces(self, scene: CompiledScene, paths: Paths, shade: Shading) -> None:
         """Record the surfaces that paths have met, which are ready to shade."""

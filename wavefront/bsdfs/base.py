@@ -18,7 +18,7 @@ from ..arrays.state import SurfaceInteraction
 from ..arrays.vec import Bools, Floats, broadcast
 from ..core.errors import SceneError
 from ..core.html import preview_html
-from ..core.parameter import Parametrized
+from ..core.parameter import Parametrized, instance_of
 from ..core.suggestions import MATERIAL_ARGUMENTS
 from ..sampling.warp import cosine_hemisphere, cosine_hemisphere_pdf
 from ..textures.base import BaseTexture
@@ -233,3 +233,6 @@ def _check_shapes(bsdf: Bsdf, n: int, found: dict[str, tuple[Any, int | None]]) 
             raise SceneError(
                 f"{type(bsdf).__name__}: {name} has the shape {have}; it must have {due} = {wanted}"
             )
+
+
+is_bsdf = instance_of(Bsdf, "a Bsdf such as wf.Diffuse(0.5)")

@@ -3,23 +3,15 @@
 from __future__ import annotations
 
 from copy import copy
-from typing import Any, Self
+from typing import Self
 
 import numpy as np
 
 from ..arrays.state import SurfaceInteraction
 from ..arrays.vec import BELOW_ONE, Bools, Floats, f4
-from ..core.errors import SceneError
 from ..core.parameter import Parameter, parametrized
 from ..textures.parameter import Scalar, scalar
-from .base import Bsdf, BsdfSample, JointBsdf, weigh
-
-
-def _component(name: str, value: Any) -> Bsdf:
-    """Return a BSDF that can be a part of another."""
-    if not isinstance(value, Bsdf):
-        raise SceneError(f"{name} must be a Bsdf such as wf.Diffuse(0.5), got {value!r}")
-    return value
+from .base import Bsdf, BsdfSample, JointBsdf, is_bsdf, weigh
 
 
 @parametrized
@@ -45,8 +37,8 @@ class Mix(JointBsdf):
 
     dimensions = 3
 
-    first: Parameter[Bsdf] = Parameter(_component)
-    second: Parameter[Bsdf] = Parameter(_component)
+    first: Parameter[Bsdf] = Parameter(is_bsdf)
+    second: Parameter[Bsdf] = Parameter(is_bsdf)
     weight: Parameter[Scalar] = Parameter(scalar, default=0.5)
 
     def derive(self) -> None:

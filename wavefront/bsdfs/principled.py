@@ -10,7 +10,7 @@ import numpy as np
 
 from ..arrays.state import SurfaceInteraction
 from ..arrays.vec import INV_PI, TINY, Bools, Floats, broadcast, dot, f4, luminance
-from ..core.parameter import Parameter, flag, parametrized
+from ..core.parameter import Parameter, flag, optional, parametrized
 from ..sampling.warp import cosine_hemisphere, cosine_hemisphere_pdf
 from ..textures.base import BaseTexture
 from ..textures.parameter import Color, Scalar, color, refractive_index, scalar
@@ -20,7 +20,7 @@ from .dielectric import LEAST_BEND
 from .energy import Loss, Shape, gain, loss, mean_over_cosines, part_kept
 from .fresnel import fresnel_dielectric
 from .microfacet import Facets, alpha_of, reflect, refract
-from .rough import Microfacets, angle, roughness_across
+from .rough import Microfacets, angle
 from .sheen import sheen_albedo, sheen_lobe
 from .thin_film import film_reflectance, has_film, thickness
 
@@ -104,7 +104,7 @@ class Principled(Microfacets):
     roughness: Parameter[Scalar] = Parameter(scalar, default=0.5)
     ior: Parameter[Scalar] = Parameter(refractive_index, default=1.5)
     transmission: Parameter[Scalar] = Parameter(scalar, default=0.0)
-    roughness_v: Parameter[Scalar | None] = Parameter(roughness_across, default=None, kw_only=True)
+    roughness_v: Parameter[Scalar | None] = Parameter(optional(scalar), default=None, kw_only=True)
     rotation: Parameter[Scalar] = Parameter(angle, default=0.0, kw_only=True)
     thin: Parameter[bool] = Parameter(flag, default=False, kw_only=True)
     clearcoat: Parameter[Scalar] = Parameter(scalar, default=0.0, kw_only=True)

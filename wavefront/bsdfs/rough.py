@@ -11,7 +11,7 @@ from ..arrays.elementary import sin_cos_turns
 from ..arrays.state import SurfaceInteraction
 from ..arrays.vec import Floats, dot, f4
 from ..core.errors import one_of
-from ..core.parameter import Parameter, flag, parametrized
+from ..core.parameter import Parameter, flag, optional, parametrized
 from ..textures.base import BaseTexture
 from ..textures.parameter import Scalar, scalar
 from .base import JointBsdf
@@ -25,11 +25,6 @@ Shadowing: TypeAlias = Literal["correlated", "separable"]
 angle = partial(scalar, holds=np.isfinite, limit="finite")
 distribution_of = partial(one_of, choices=("ggx", "beckmann"))
 shadowing_of = partial(one_of, choices=("correlated", "separable"))
-
-
-def roughness_across(name: str, value: Scalar | None) -> Any:
-    """Return a roughness, or None where it is that along the tangent."""
-    return None if value is None else scalar(name, value)
 
 
 class Tangent(BaseTexture):
@@ -106,7 +101,7 @@ class Microfacets(JointBsdf):
 class RoughBsdf(Microfacets):
     """A BSDF with all parameters of microfacets but `roughness`, whose place a subclass chooses."""
 
-    roughness_v: Parameter[Scalar | None] = Parameter(roughness_across, default=None, kw_only=True)
+    roughness_v: Parameter[Scalar | None] = Parameter(optional(scalar), default=None, kw_only=True)
     rotation: Parameter[Scalar] = Parameter(angle, default=0.0, kw_only=True)
     distribution: Parameter[Distribution] = Parameter(distribution_of, default="ggx", kw_only=True)
     shadowing: Parameter[Shadowing] = Parameter(shadowing_of, default="correlated", kw_only=True)

@@ -10,7 +10,7 @@ import signal
 import threading
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
-from types import FrameType, TracebackType
+from types import FrameType
 from typing import Any, Self
 
 from .shared import AT_ONCE, STOP, SharedInt
@@ -61,9 +61,7 @@ class InterruptHandler:
             self._depth = min(1, len(self._signals))
         return self
 
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
+    def __exit__(self, kind: object, *raised: object) -> None:
         """Let Ctrl-C raise KeyboardInterrupt again."""
         if not self._depth or threading.current_thread() is not threading.main_thread():
             return

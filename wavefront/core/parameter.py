@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any, ClassVar, Generic, TypeVar, dataclass_tra
 
 import numpy as np
 
+from .errors import SceneError
 from .suggestions import suggests_keywords
 
 T = TypeVar("T")
@@ -95,6 +96,22 @@ def parametrized(cls: C) -> C:
 def flag(name: str, value: Any) -> bool:
     """Return whether a value is true."""
     return bool(value)
+
+
+def optional(convert: Callable[[str, Any], Any]) -> Callable[[str, Any], Any]:
+    """Return the check of a parameter that may be None."""
+    return lambda name, value: None if value is None else convert(name, value)
+
+
+def instance_of(kind: type, wanted: str) -> Callable[[str, Any], Any]:
+    """Return the check of a parameter that is an object of a class; `wanted` names it in messages."""
+
+    def check(name: str, value: Any) -> Any:
+        if not isinstance(value, kind):
+            raise SceneError(f"{name} must be {wanted}, got {value!r}")
+        return value
+
+    return check
 
 
 class Parametrized:

@@ -7,6 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from ..aovs.path_recorder import MetSurfaces
 from ..aovs.recorder import add_to_slots
 from ..arrays.state import Contribution, Hits, Paths
 from ..arrays.vec import Floats, Ints, highest, take
@@ -53,7 +54,7 @@ def intersect_and_compact(
         lanes = off_catchers(scene, hits, lanes)
     kept = compact(scene, paths, hits, lanes)
     if paths.recorder is not None:
-        paths.recorder.record_hits(bounce, scene, paths, hits, lanes, *kept)
+        paths.recorder.record_hits(scene, MetSurfaces(bounce, paths, hits, lanes, *kept))
     return kept
 
 

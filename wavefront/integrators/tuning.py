@@ -19,9 +19,9 @@ from typing import TypeAlias
 import numpy as np
 
 from ..accel.counter import RayCounter
-from ..aovs.path_recorder import PathRecorder
+from ..aovs.path_recorder import MetSurfaces, PathRecorder
 from ..arrays.soa import soa
-from ..arrays.state import Hits, Paths, Words
+from ..arrays.state import Words
 from ..arrays.vec import ALL, Doubles, Ints
 from ..camera import Camera
 from ..compile.scene import CompiledScene
@@ -102,19 +102,10 @@ class SecondPoints(PathRecorder):
     def __init__(self, materials: int) -> None:
         self.met = np.zeros(materials, np.intp)
 
-    def record_hits(
-        self,
-        bounce: int,
-        scene: CompiledScene,
-        paths: Paths,
-        hits: Hits,
-        kept: Ints,
-        kept_paths: Paths,
-        kept_hits: Hits,
-    ) -> None:
+    def record_hits(self, scene: CompiledScene, met: MetSurfaces) -> None:
         """Count those of the first bounce that go on."""
-        if bounce == 1:
-            self.met += np.bincount(material_rows(scene, kept_hits, ALL), minlength=self.met.size)
+        if met.bounce == 1:
+            self.met += np.bincount(material_rows(scene, met.kept_hits, ALL), minlength=self.met.size)
 
 
 @soa

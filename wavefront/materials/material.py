@@ -3,15 +3,17 @@
 from __future__ import annotations
 
 from copy import copy
+from functools import partial
 from typing import Any, Self, TypeAlias
 
 import numpy as np
 
 from ..arrays.vec import f4
 from ..bsdfs import Bsdf
+from ..bsdfs.base import is_bsdf
 from ..core.errors import SceneError, number
 from ..core.html import preview_html
-from ..core.parameter import Parameter, Parametrized, parametrized
+from ..core.parameter import Parameter, Parametrized, instance_of, optional, parametrized
 from ..core.suggestions import suggests_keywords
 from ..film.aov_names import DEFAULT_GROUP, group_name
 from ..media import BaseMedium
@@ -21,48 +23,19 @@ from .alpha import Opacity, alpha_value
 from .named import named_bsdf
 
 
-def _bsdf(name: str, value: Any) -> Bsdf:
-    if not isinstance(value, Bsdf):
-        raise SceneError(f"{name} must be a Bsdf such as wf.Diffuse(0.5), got {value!r}")
-    return value
-
-
-def _alpha(name: str, value: Any) -> Any:
-    return None if value is None else alpha_value(name, value)
-
-
-def _cutoff(name: str, value: Any) -> float | None:
-    return None if value is None else number(name, value, lambda x: x >= 0, "at least 0")
-
-
-def _normal_map(name: str, value: Any) -> BaseNormalMap | None:
-    if value is not None and not isinstance(value, BaseNormalMap):
-        raise SceneError(f"{name} must be a NormalMap or a BumpMap, got {value!r}")
-    return value
-
-
 def _emission(name: str, value: Any) -> Any:
     """Return a radiance as (3, 1) float32 or a texture of colors; None where it is black."""
     radiance = None if value is None else color(name, value, np.inf)
     return None if isinstance(radiance, np.ndarray) and not radiance.any() else radiance
 
 
-def _interior(name: str, value: Any) -> BaseMedium | None:
-    if value is not None and not isinstance(value, BaseMedium):
-        raise SceneError(f"{name} must be a Medium such as wf.Medium(absorption=1), got {value!r}")
-    return value
-
-
-def _priority(name: str, value: Any) -> int | None:
-    if value is None:
-        return None
+def _priority(name: str, value: Any) -> int:
     return int(number(name, value, lambda x: x == int(x) and abs(x) < 2**31, "a whole number below 2**31"))
 
 
-def _name(name: str, value: Any) -> str | None:
-    if value is not None and not isinstance(value, str):
-        raise SceneError(f"{name} must be text, got {value!r}")
-    return value
+_cutoff = partial(number, holds=lambda x: x >= 0, limit="at least 0")
+_normal_map = instance_of(BaseNormalMap, "a NormalMap or a BumpMap")
+_interior = instance_of(BaseMedium, "a Medium such as wf.Medium(absorption=1)")
 
 
 @parametrized
@@ -114,15 +87,15 @@ class Material(Parametrized):
     >>> green_glass = wf.Material(wf.Dielectric(1.5), interior=wf.Medium(absorption=(2, 0.2, 1)))
     """
 
-    bsdf: Parameter[Bsdf] = Parameter(_bsdf)
-    alpha: Parameter[Scalar | None] = Parameter(_alpha, default=None, kw_only=True)
-    alpha_cutoff: Parameter[float | None] = Parameter(_cutoff, default=None, kw_only=True)
-    normal_map: Parameter[BaseNormalMap | None] = Parameter(_normal_map, default=None, kw_only=True)
+    bsdf: Parameter[Bsdf] = Parameter(is_bsdf)
+    alpha: Parameter[Scalar | None] = Parameter(optional(alpha_value), default=None, kw_only=True)
+    alpha_cutoff: Parameter[float | None] = Parameter(optional(_cutoff), default=None, kw_only=True)
+    normal_map: Parameter[BaseNormalMap | None] = Parameter(optional(_normal_map), default=None, kw_only=True)
     emission: Parameter[Color | None] = Parameter(_emission, default=None, kw_only=True)
-    interior: Parameter[BaseMedium | None] = Parameter(_interior, default=None, kw_only=True)
-    priority: Parameter[int | None] = Parameter(_priority, default=None, kw_only=True)
+    interior: Parameter[BaseMedium | None] = Parameter(optional(_interior), default=None, kw_only=True)
+    priority: Parameter[int | None] = Parameter(optional(_priority), default=None, kw_only=True)
     group: Parameter[str] = Parameter(group_name, default=DEFAULT_GROUP, kw_only=True)
-    name: Parameter[str | None] = Parameter(_name, default=None, kw_only=True)
+    name: Parameter[str | None] = Parameter(optional(instance_of(str, "text")), default=None, kw_only=True)
 
     @classmethod
     @suggests_keywords

@@ -13,7 +13,7 @@ from ..arrays.soa import soa
 from ..arrays.vec import FLOAT32_MAX, TINY, Bools, Doubles, Floats, Ints, dot, f4, highest, take
 from ..colors.spectrum import blackbody_colors
 from ..core.errors import SceneError, as_array, finite_array, number
-from ..core.parameter import Parameter, parametrized
+from ..core.parameter import Parameter, optional, parametrized
 from ..sampling.steps import StepNumbers
 from .base import BaseMedium, Flight, GlowWeights, MediumRecord, channel_shares
 from .marching import March, optical_depth
@@ -55,11 +55,6 @@ def _colors_or(convert: Any, high: float = FLOAT32_MAX) -> Any:
         return convert(name, value)
 
     return check
-
-
-def _optional(convert: Any) -> Any:
-    """Return the check of a parameter that may be None."""
-    return lambda name, value: None if value is None else convert(name, value)
 
 
 def _transform(name: str, value: Any) -> Doubles:
@@ -135,10 +130,10 @@ class GridMedium(BaseMedium):
     phase: Parameter[PhaseFunction | None] = Parameter(phase_or_isotropic, default=None, kw_only=True)
     scale: Parameter[float] = Parameter(_scale, default=1.0, kw_only=True)
     emission: Parameter[ArrayLike | None] = Parameter(
-        _colors_or(_optional(_coefficient)), default=None, kw_only=True
+        _colors_or(optional(_coefficient)), default=None, kw_only=True
     )
-    temperature: Parameter[ArrayLike | None] = Parameter(_optional(_grid), default=None, kw_only=True)
-    majorant_cells: Parameter[int | None] = Parameter(_optional(_cells), default=None, kw_only=True)
+    temperature: Parameter[ArrayLike | None] = Parameter(optional(_grid), default=None, kw_only=True)
+    majorant_cells: Parameter[int | None] = Parameter(optional(_cells), default=None, kw_only=True)
 
     def derive(self) -> None:
         """Set the coefficients that are rendered."""

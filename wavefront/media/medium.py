@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from copy import copy
+from functools import partial
 from typing import Any, Self
 
 import numpy as np
@@ -13,7 +14,7 @@ from ..arrays.soa import soa
 from ..arrays.vec import FLOAT32_MAX, Doubles, Floats, Ints, f4, highest, take
 from ..colors import rgb
 from ..core.errors import SceneError, number
-from ..core.parameter import Parameter, parametrized
+from ..core.parameter import Parameter, optional, parametrized
 from ..sampling.steps import StepNumbers
 from ..textures.base import BaseTexture
 from .base import BaseMedium, Flight, GlowWeights, MediumRecord, channel_shares, chosen_channel
@@ -31,14 +32,11 @@ def _coefficient(name: str, value: Any, high: float = np.inf) -> Any:
     return rgb(name, value, high)
 
 
-def _albedo(name: str, value: Any) -> Any:
-    return None if value is None else rgb(name, value, 1.0)
+_albedo = optional(partial(rgb, high=1.0))
 
 
 def _length(name: str, value: Any) -> Any:
-    """Return a length per channel, (3, 1) float32 above 0, or None."""
-    if value is None:
-        return None
+    """Return a length per channel, (3, 1) float32 above 0."""
     lengths = _coefficient(name, value)
     if not lengths.all():
         raise SceneError(f"{name} is {value!r}; it must be more than 0")
@@ -91,7 +89,7 @@ class Medium(BaseMedium):
     scale: Parameter[float] = Parameter(_scale, default=1.0, kw_only=True)
     emission: Parameter[ArrayLike] = Parameter(_coefficient, default=0.0, kw_only=True)
     albedo: Parameter[ArrayLike | None] = Parameter(_albedo, default=None, kw_only=True)
-    mean_free_path: Parameter[ArrayLike | None] = Parameter(_length, default=None, kw_only=True)
+    mean_free_path: Parameter[ArrayLike | None] = Parameter(optional(_length), default=None, kw_only=True)
 
     def derive(self) -> None:
         """Set the coefficients that are rendered."""

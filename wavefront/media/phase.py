@@ -3,14 +3,15 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
+from functools import partial
 from typing import Any
 
 import numpy as np
 
 from ..arrays.elementary import exp, log, sin_cos_turns
 from ..arrays.vec import INV_FOUR_PI, TINY, Floats, f4
-from ..core.errors import SceneError, number
-from ..core.parameter import Parameter, Parametrized, parametrized
+from ..core.errors import number
+from ..core.parameter import Parameter, Parametrized, instance_of, parametrized
 
 MOST_FORWARD = 0.99  # largest |g|: float32 resolves lobes up to there
 LARGEST_BELOW_ONE = 1 - 2.0**-24
@@ -143,20 +144,12 @@ class Rayleigh(PhaseFunction):
         return np.clip(np.copysign(root - f4(1) / root, z), f4(-1), f4(1))
 
 
-def as_phase(name: str, value: Any) -> PhaseFunction:
-    """Return a phase function; raise a SceneError for anything else."""
-    if not isinstance(value, PhaseFunction):
-        raise SceneError(f"{name} must be a phase function such as wf.HenyeyGreenstein(0.8), got {value!r}")
-    return value
+as_phase = instance_of(PhaseFunction, "a phase function such as wf.HenyeyGreenstein(0.8)")
 
 
 def phase_or_isotropic(name: str, value: Any) -> PhaseFunction:
     """Return a phase function; None is `Isotropic()`."""
     return Isotropic() if value is None else as_phase(name, value)
-
-
-def _share(name: str, value: Any) -> float:
-    return number(name, value, lambda x: 0 <= x <= 1, "in [0, 1]")
 
 
 @parametrized
@@ -184,7 +177,9 @@ class PhaseMix(PhaseFunction):
 
     first: Parameter[PhaseFunction] = Parameter(as_phase)
     second: Parameter[PhaseFunction] = Parameter(as_phase)
-    weight: Parameter[float] = Parameter(_share, default=0.5)
+    weight: Parameter[float] = Parameter(
+        partial(number, holds=lambda x: 0 <= x <= 1, limit="in [0, 1]"), default=0.5
+    )
 
     @property
     def mean_cosine(self) -> float:

@@ -7,8 +7,8 @@ from functools import cache
 
 import numpy as np
 
-from ..aovs.path_recorder import PathRecorder
-from ..arrays.state import Contribution, Hits, Paths, Words
+from ..aovs.path_recorder import MetSurfaces, PathRecorder
+from ..arrays.state import Contribution, Paths, Words
 from ..arrays.vec import Bools, Floats, Ints
 from ..camera import Camera
 from ..compile.scene import CompiledScene
@@ -84,20 +84,11 @@ class NanRecorder(PathRecorder):
         self._bounce = 1
         return self
 
-    def record_hits(
-        self,
-        bounce: int,
-        scene: CompiledScene,
-        paths: Paths,
-        hits: Hits,
-        kept: Ints,
-        kept_paths: Paths,
-        kept_hits: Hits,
-    ) -> None:
+    def record_hits(self, scene: CompiledScene, met: MetSurfaces) -> None:
         """Keep the bounce, which that of light met before it is, too."""
-        self._bounce = bounce
+        self._bounce = met.bounce
         if self._bad_emission:
-            self._note(f"bounce {bounce}, emission that the path meets")
+            self._note(f"bounce {met.bounce}, emission that the path meets")
 
     def record_surfaces(self, scene: CompiledScene, paths: Paths, shade: Shading) -> None:
         """Check what absorption has left of the paths, and the AOVs that the surfaces give."""

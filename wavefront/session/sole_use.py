@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import threading
-from types import TracebackType
 
 from ..core.errors import RenderError
 
@@ -28,9 +27,7 @@ class SoleUse:
             raise RenderError(f"the session is in use by {by}; meanwhile it can only be stopped or dropped")
         self._user = threading.get_ident()
 
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
+    def __exit__(self, *raised: object) -> None:
         """Let others enter."""
         self._user = 0
         self._lock.release()

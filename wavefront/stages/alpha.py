@@ -42,30 +42,17 @@ def alpha_pass_through(
         If a ray meets more surfaces than there are random numbers for.
     """
     catches = bounce == 0 and scene.shadow_catchers is not None
-    media, lanes = scene.media, np.arange(len(paths))
-    if scene.opacities is None and not catches and media is None:
-        return paths, hits
-    if media is None:
+    lanes = np.arange(len(paths))
+    if scene.media is None:
         lanes = _passable(scene, paths, hits, lanes, catches)
         if not lanes.size:
             return paths, hits
-    paths = replace(
-        paths, origin=paths.origin.copy(), exclude_prim=paths.exclude_prim.copy(), prev_vertex=paths.origin
-    )
-    if media is not None:
-        glow = np.zeros_like(paths.origin) if media.glows else None
-        paths = replace(paths, media=np.array(paths.media), throughput=np.array(paths.throughput), glow=glow)
-    numbers = iter(numbers_of(Dimension.OPACITY))
-    while lanes.size:
-        dimension = next(numbers, None)
-        if dimension is None:
-            most = len(numbers_of(Dimension.OPACITY))
-            raise RenderError(f"a ray meets more than {most} surfaces with an opacity below 1")
-        if media is not None:
-            lanes = fly(scene, paths, hits, lanes, sampler, bounce, dimension - Dimension.OPACITY, mis)
-            lanes = _passable(scene, paths, hits, lanes, catches)
-            if not lanes.size:
-                break
+    paths = _own_columns(scene, paths)
+    for dimension in numbers_of(Dimension.OPACITY):
+        lanes = fly(scene, paths, hits, lanes, sampler, bounce, dimension - Dimension.OPACITY, mis)
+        lanes = _passable(scene, paths, hits, lanes, catches)
+        if not lanes.size:
+            return paths, hits
         here, at = paths.take(lanes), hits.take(lanes)
         surface = interaction(scene, here, at)
         opacity = _opacities(scene, here, at, surface, sampler, catches)
@@ -79,15 +66,27 @@ def alpha_pass_through(
         paths.origin[:, lanes], paths.exclude_prim[lanes] = here.origin, here.exclude_prim
         paths.throughput[:, lanes] = here.throughput
         hits.put(lanes, intersect(scene, here))
-        if media is None:
-            lanes = _passable(scene, paths, hits, lanes, catches)
-        else:
+        if paths.media is not None:
             paths.media[:, lanes] = cross(scene, here.media, surface)
-    return paths, hits
+    most = len(numbers_of(Dimension.OPACITY))
+    raise RenderError(f"a ray meets more than {most} surfaces with an opacity below 1")
+
+
+def _own_columns(scene: CompiledScene, paths: Paths) -> Paths:
+    """Return paths with copies of what changes on their way to the next surface."""
+    own = replace(
+        paths, origin=paths.origin.copy(), exclude_prim=paths.exclude_prim.copy(), prev_vertex=paths.origin
+    )
+    if scene.media is None:
+        return own
+    glow = np.zeros_like(paths.origin) if scene.media.glows else None
+    return replace(own, media=np.array(paths.media), throughput=np.array(paths.throughput), glow=glow)
 
 
 def _passable(scene: CompiledScene, paths: Paths, hits: Hits, lanes: Ints, catches: bool) -> Ints:
     """Return those of some lanes (k,) that hit a surface that they may pass; with `catches`, catchers too."""
+    if scene.opacities is None and scene.media is None and not catches:
+        return lanes[:0]
     found = passable(scene, hits, lanes, None if paths.media is None else take(paths.media, lanes))
     if catches:
         found[np.searchsorted(lanes, catcher_lanes(scene, hits, lanes))] = True

@@ -7,7 +7,6 @@ import sys
 import threading
 import webbrowser
 from importlib.util import find_spec
-from types import TracebackType
 from typing import Any, Self, Unpack
 
 from ..camera import Camera
@@ -106,9 +105,7 @@ class Viewer:
     def __enter__(self) -> Self:
         return self
 
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
+    def __exit__(self, *raised: object) -> None:
         """Close the viewer."""
         self.close()
 
