@@ -12,6 +12,7 @@ from wavefront.bsdfs import (
     Conductor,
     Dielectric,
     Diffuse,
+    DiffuseTransmission,
     Disney,
     Mirror,
     Mix,
@@ -376,12 +377,17 @@ RANDOM[ThinDisney] = lambda rng, roughness: ThinDisney(
     specular_tint=0.3 * rng.random(),
     flatness=rng.random(),
 )
+RANDOM[DiffuseTransmission] = lambda rng, roughness: DiffuseTransmission(0.5 * color(rng), 0.5 * color(rng))
 RANDOM[Sides] = lambda rng, roughness: Sides(
     RANDOM[rng.choice([Diffuse, Mirror, Conductor])](rng, roughness),
     rng.choice([None, RANDOM[rng.choice([OrenNayar, Plastic])](rng, roughness)]),
 )
 # with the roughnesses of each; None is a random one, and the others have none
-KINDS = [(kind, r) for kind in ALL for r in ([None] if kind in (Diffuse, Mirror) else ROUGHNESS)]
+KINDS = [
+    (kind, r)
+    for kind in ALL
+    for r in ([None] if kind in (Diffuse, DiffuseTransmission, Mirror) else ROUGHNESS)
+]
 
 
 def test_every_material_has_random_parameters():

@@ -12,6 +12,7 @@ from wavefront.bsdfs import (
     Conductor,
     Dielectric,
     Diffuse,
+    DiffuseTransmission,
     Disney,
     Mirror,
     Mix,
@@ -112,6 +113,10 @@ EXAMPLES = {
         {"base_color": 0.5, "diffuse_transmission": 1.4, "flatness": 0.7, "sheen": 0.1, "sheen_tint": 0.5},
         {"base_color": (0.9, 0.5, 0.1), "transmission": 1.0, "roughness": 0.7, "specular_tint": 0.5},
         {"base_color": (0.3, 0.2, 0.1)},
+    ],
+    DiffuseTransmission: [
+        {"reflectance": (0.6, 0.3, 0.1), "transmittance": (0.1, 0.2, 0.4)},
+        {"reflectance": 0.0, "transmittance": 0.7},
     ],
     Sides: [
         {"front": Diffuse((0.9, 0.5, 0.1))},
@@ -363,6 +368,7 @@ BAD = {
         },
         **{name: [-1] for name in ("sheen", "sheen_tint", "flatness", "clearcoat", "clearcoat_gloss")},
     },
+    DiffuseTransmission: {"reflectance": [2], "transmittance": [-1]},
     ThinDisney: {
         "ior": [(0, "more than 0")],
         "diffuse_transmission": [(2.5, "[0, 2]"), (-0.1, "[0, 2]")],

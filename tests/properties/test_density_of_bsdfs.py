@@ -20,6 +20,7 @@ from wavefront.bsdfs import (
     Conductor,
     Dielectric,
     Diffuse,
+    DiffuseTransmission,
     Disney,
     Measured,
     Mirror,
@@ -69,6 +70,7 @@ MATTE = st.one_of(st.builds(Diffuse, color), st.builds(OrenNayar, color, st.floa
 SHINY = st.one_of(st.builds(Conductor, color, st.floats(0.5, 5), rough), st.builds(Dielectric, index, rough))
 KINDS = {
     Diffuse: st.builds(Diffuse, color),
+    DiffuseTransmission: st.builds(DiffuseTransmission, color, color),
     ShadowCatcher: st.builds(ShadowCatcher, color),
     OrenNayar: st.builds(OrenNayar, color, st.floats(0, 1), energy_preserving=st.booleans()),
     Mirror: st.builds(Mirror, color),

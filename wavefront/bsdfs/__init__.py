@@ -4,6 +4,7 @@ from .base import Bsdf, BsdfSample, albedo_of, evaluated, sampled
 from .conductor import Conductor
 from .dielectric import Dielectric
 from .diffuse import Diffuse
+from .diffuse_transmission import DiffuseTransmission
 from .disney import Disney
 from .disney_thin import ThinDisney
 from .measured import Measured
@@ -24,6 +25,7 @@ ALL = (
     Mirror,
     Dielectric,
     Conductor,
+    DiffuseTransmission,
     OrenNayar,
     ThinDielectric,
     Plastic,
@@ -42,6 +44,7 @@ __all__ = [
     "Conductor",
     "Dielectric",
     "Diffuse",
+    "DiffuseTransmission",
     "Disney",
     "Measured",
     "Mirror",

@@ -13,6 +13,7 @@ from ...bsdfs import (
     Conductor,
     Dielectric,
     Diffuse,
+    DiffuseTransmission,
     Mix,
     NullSurface,
     Plastic,
@@ -189,9 +190,9 @@ def _thin_dielectric(entity: Entity, job: Job) -> Material:
 
 @converts("material", "diffusetransmission")
 def _diffuse_transmission(entity: Entity, job: Job) -> Material:
-    entity.harmless("transmittance")
-    entity.lose("the light that it transmits")
-    return _made(entity, Diffuse(_albedo(entity, "reflectance", 0.25, job, entity.number("scale", 1.0))), job)
+    factor = entity.number("scale", 1.0)
+    sides = (_albedo(entity, name, 0.25, job, factor) for name in ("reflectance", "transmittance"))
+    return _made(entity, DiffuseTransmission(*sides), job)
 
 
 @converts("material", "mix")
@@ -238,40 +239,58 @@ def _homogeneous(entity: Entity, job: Job) -> Medium | None:
 
 @converts("medium", "uniformgrid")
 def _grid(entity: Entity, job: Job) -> GridMedium:
-    size = tuple(entity.whole(name, 1, 1) for name in ("nz", "ny", "nx"))
-    density = _voxels(entity, "density", size)
+    density = _voxels(entity, "density", "float")
     if density is None:
         raise SceneError("has no density")
     absorbed, scattered = (entity.spectrum(name, 1.0, job, "unbounded") for name in ("sigma_a", "sigma_s"))
     glow = entity.spectrum("Le", 0.0, job, "light") * job.exposure * absorbed
-    factor = _voxels(entity, "Lescale", size)
+    factor = _voxels(entity, "Lescale", "float")
     if factor is not None:
         glow = (density * factor)[..., None] * np.broadcast_to(glow, 3)
-    low, high = entity.vector("p0", (0.0, 0.0, 0.0)), entity.vector("p1", (1.0, 1.0, 1.0))
-    box = np.diag([*(high - low), 1.0])
-    box[:3, 3] = low
     return GridMedium(
-        density,
-        job.world @ entity.matrix @ box,
-        absorbed,
-        scattered,
-        phase=HenyeyGreenstein(entity.number("g", 0.0)),
-        scale=entity.number("scale", 1.0),
-        emission=glow,
+        density, **_placed(entity, job), absorption=absorbed, scattering=scattered, emission=glow
     )
 
 
-def _voxels(entity: Entity, name: str, size: tuple[int, ...]) -> Any:
-    """Return the numbers of a grid (z, y, x); None without."""
-    given = entity.array(name, ("float",))
-    if given is not None and len(given) != np.prod(size, dtype=float):
-        raise SceneError(
-            f"{name} has {len(given)} numbers; nx, ny and nz make {np.prod(size, dtype=float):g}"
-        )
-    return None if given is None else np.reshape(given, size)
+@converts("medium", "rgbgrid")
+def _color_grid(entity: Entity, job: Job) -> GridMedium:
+    absorbed, scattered, light = (_voxels(entity, name, "rgb") for name in ("sigma_a", "sigma_s", "Le"))
+    given = [each for each in (absorbed, scattered) if each is not None]
+    if not given:
+        raise SceneError("has no sigma_a and no sigma_s")
+    absorbed, scattered = (np.ones_like(given[0]) if each is None else each for each in (absorbed, scattered))
+    factor = entity.number("Lescale", 1.0) * job.exposure
+    extinction = absorbed + scattered
+    return GridMedium(
+        extinction,
+        **_placed(entity, job),
+        albedo=scattered / np.where(extinction == 0, 1, extinction),
+        emission=None if light is None else absorbed * light * factor,
+    )
 
 
-unsupported("medium", "rgbgrid cloud nanovdb")
+def _placed(entity: Entity, job: Job) -> dict[str, Any]:
+    """Return where a grid is, and its phase function and scale."""
+    low, high = entity.vector("p0", (0.0, 0.0, 0.0)), entity.vector("p1", (1.0, 1.0, 1.0))
+    box = np.diag([*(high - low), 1.0])
+    box[:3, 3] = low
+    phase, scale = HenyeyGreenstein(entity.number("g", 0.0)), entity.number("scale", 1.0)
+    return {"transform": job.world @ entity.matrix @ box, "phase": phase, "scale": scale}
+
+
+def _voxels(entity: Entity, name: str, kind: str) -> Any:
+    """Return the numbers (z, y, x) or colors (z, y, x, 3) of a grid; None without."""
+    size = tuple(entity.whole(each, 1, 1) for each in ("nz", "ny", "nx"))
+    given, count = entity.array(name, (kind,)), np.prod(size, dtype=float)
+    if given is None:
+        return None
+    if len(given) != count:
+        what = "numbers" if kind == "float" else "colors"
+        raise SceneError(f"{name} has {len(given)} {what}; nx, ny and nz make {count:g}")
+    return given.reshape(*size, *given.shape[1:])
+
+
+unsupported("medium", "cloud nanovdb")
 
 
 def material_of(state: Any, alpha: Value, job: Job, label: Entity) -> Material:
