@@ -68,9 +68,14 @@ class Found:
 def measured(
     scene: wf.Scene, points: Any, normals: Any, spp: int, copies: int = 4, **settings: Any
 ) -> tuple[Doubles, Doubles, int]:
-    """Return values and standard errors at points, each of some sensors, and the degrees of freedom."""
+    """Return values and standard errors at points, each of some sensors, and the degrees of freedom.
+
+    Sensors share no paths, so that all errors are independent.
+    """
     points, normals = np.repeat(points, copies, 0), np.repeat(normals, copies, 0)
-    found = wf.measure(scene, points, normals, spp=max(spp // copies, 8), **{**QUIET, **settings})
+    found = wf.measure(
+        scene, points, normals, spp=max(spp // copies, 8), reuse=False, **{**QUIET, **settings}
+    )
     value, error = (
         each[:, 1].reshape(-1, copies).astype(float) for each in (found.value, found.standard_error)
     )

@@ -10,7 +10,7 @@ from significance import Mean, assert_mean, assert_same_images, render, repeat
 
 import wavefront as wf
 from wavefront.integrators import training
-from wavefront.sampling.tiles import others_in_tile, place_in_tiles
+from wavefront.sampling.tiles import PictureTiles, others_in_tile, place_in_tiles
 from wavefront.stages import reuse
 
 # --- Tiles ----------------------------------------------------------------------------------------
@@ -31,7 +31,7 @@ def test_tiles_divide_a_picture() -> None:
         cells = sorted(zip(rows // 7, columns // 7, strict=True))
         assert cells == [(row, column) for row in range(4, 8) for column in range(4)]
     one = 8 * width + 10
-    others = others_in_tile(pixels, one, width)
+    others = others_in_tile(pixels, one, PictureTiles(width, 1))
     assert sorted([one, *others.tolist()]) == np.flatnonzero(tile == tile[one]).tolist()
 
 

@@ -19,7 +19,7 @@ from wavefront.compile.scene import compile_scene
 from wavefront.guiding.cells import GuideCells
 from wavefront.guiding.guide_table import GuideTable
 from wavefront.sampling.tiles import MEMBERS as MEMBERS_OF_TILES
-from wavefront.sampling.tiles import WaveTiles
+from wavefront.sampling.tiles import PictureTiles, WaveTiles
 from wavefront.stages import reuse
 from wavefront.stages.reuse import (
     FirstPoints,
@@ -241,7 +241,7 @@ def test_what_nobody_reaches_stays_with_its_path(monkeypatch: pytest.MonkeyPatch
     points.throughput = rng.uniform(0.2, 1, (3, 2)).astype(f4)
     light = rng.uniform(0.2, 1, (3, 2)).astype(f4)
     light[:, 0] = 1  # is no other than any light
-    tiles = WaveTiles.of(np.array([0, 0], np.uint32), np.array([0, 1], np.uint32), 100)
+    tiles = WaveTiles.of(np.array([0, 0], np.uint32), np.array([0, 1], np.uint32), PictureTiles(100, 1))
     arrived = rng.uniform(0.2, 1, (3, MEMBERS_OF_TILES, tiles.count)).astype(f4)
 
     def first_of(scene, lit, albedo, lane_in):

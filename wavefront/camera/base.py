@@ -24,6 +24,7 @@ from ..core.errors import (
 )
 from ..core.parameter import brief
 from ..core.suggestions import suggests_keywords
+from ..sampling.tiles import PictureTiles, Tiles
 from .distortion import Distortion
 from .projection import Orthographic, Panorama, Perspective, Projection
 
@@ -432,6 +433,11 @@ class Camera:
     def uses_lens(self) -> bool:
         """Whether rays start at sampled points of a lens."""
         return self.projection.uses_lens
+
+    @property
+    def tiles(self) -> Tiles:
+        """The tiles of the whole picture, whose pixels may share paths."""
+        return PictureTiles(*self.resolution)
 
     def address(self, pixel: Words) -> Words:
         """Return the row-major index (n,) in the whole picture of pixels (n,) of the window."""

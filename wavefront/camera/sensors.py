@@ -12,6 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 from ..arrays.state import Words
 from ..arrays.vec import Doubles, Floats, f4
 from ..core.errors import SceneError, as_array, finite_array, one_of
+from ..sampling.tiles import PointTiles, nearby_ranks
 from .base import MAX_SIDE, Camera
 from .projection import Orthographic
 
@@ -47,10 +48,13 @@ class Sensors(Camera):
         self.directions = self._unit_directions(directions)
         self.scatterings = int(kind != "radiance")
         self.lies_on_surfaces = kind == "irradiance"
+        self.may_share = True  # paths, with other sensors
         self.lift = 0.0  # how far they are above their points, along their normals, scene units
         rows = -(-count // MAX_SIDE)
         middle = (self.points.min(0) + self.points.max(0)) / 2
         super().__init__(middle, np.eye(3), Orthographic(1), (-(-count // rows), rows))
+        every = np.minimum(np.arange(self.size[0] * self.size[1]), count - 1)
+        self._rank = nearby_ranks(self.points[every], self.directions[every])
 
     def _unit_directions(self, directions: ArrayLike | None) -> Doubles:
         """Return unit directions (n, 3)."""
@@ -72,6 +76,11 @@ class Sensors(Camera):
     def __repr__(self) -> str:
         """Return what is measured, and at how many points."""
         return f"<Sensors: {self.sensor} at {len(self.points)} points>"
+
+    @property
+    def tiles(self) -> PointTiles:
+        """The tiles of sensors that may share paths."""
+        return PointTiles(self._rank)
 
     @property
     def extent(self) -> Doubles:

@@ -51,7 +51,7 @@ class SurfaceSensors(Sensors):
         ]
         at = np.where(counts[:, None] > 0, np.stack(middles, 1), spheres[:, :3])
         super().__init__(at, (0, 0, side), "radiance" if kind == "leaving" else "irradiance")
-        self.lies_on_surfaces = True
+        self.lies_on_surfaces, self.may_share = True, False
         self.triangles, self.spheres, self.side, self._kind = triangles, spheres, side, kind
         self.normals = (
             np.where(double[:, None] > 0, cross, (0, 0, 1)) / np.where(double > 0, double, 1)[:, None]

@@ -872,7 +872,7 @@ def _film_rgb(film: Film, metadata: Mapping[str, Any]) -> Image:
     error = estimates.standard_error.reshape(shape)
     noise = estimates.worst if "sensor" in metadata else estimates.noise  # that `noise` limits
     scatter: tuple[Scatter, ...] = ()
-    if metadata.get("reuse") and {"film", "window"} <= metadata.keys():
+    if metadata.get("reuse") and {"film", "window"} <= metadata.keys() and "sensor" not in metadata:
         whole, window = metadata["film"], metadata["window"]
         scatter = film_scatter(film, error, (int(whole[0]), int(whole[1])), (int(window[0]), int(window[1])))
     return Image(

@@ -12,6 +12,7 @@ from ..compile.scene import CompiledScene
 from ..core.registry import Registry
 from ..guiding import GuideTable
 from ..sampling.sampler import Sampler
+from ..sampling.tiles import Tiles
 from .ladder import li_direct_mis, li_direct_simple, li_full, li_naive
 from .shared_paths import li_reuse
 
@@ -19,11 +20,11 @@ Integrator: TypeAlias = Callable[[CompiledScene, Paths, Sampler, int], Floats]
 
 
 def integrator_for(
-    integrator: Integrator, branches: int, reuse: bool, table: GuideTable | None
+    integrator: Integrator, branches: int, tiles: Tiles | None, table: GuideTable | None
 ) -> Integrator:
-    """Return an integrator with the given branches, sharing of paths, and guide."""
-    if reuse:
-        return partial(li_reuse, branches=branches, table=table)
+    """Return an integrator with the given branches, tiles whose pixels share paths, and guide."""
+    if tiles is not None:
+        return partial(li_reuse, branches=branches, table=table, tiles=tiles)
     if branches == 1 and table is None:
         return integrator
     return partial(li_full, branches=branches, table=table)

@@ -14,7 +14,7 @@ from ..arrays.vec import Floats, f4, highest
 from ..compile.scene import CompiledScene
 from ..guiding import GuideTable
 from ..sampling.sampler import Sampler
-from ..sampling.tiles import WaveTiles
+from ..sampling.tiles import Tiles, WaveTiles
 from ..stages.bounce import bounce_sample, branch, copies
 from ..stages.compact import alive, roulette, select
 from ..stages.glossy_points import SECTIONS, GlossyPoints
@@ -33,6 +33,8 @@ def li_reuse(
     paths: Paths,
     sampler: Sampler,
     max_bounces: int,
+    *,
+    tiles: Tiles,
     branches: int = 1,
     table: GuideTable | None = None,
 ) -> Floats:
@@ -43,14 +45,14 @@ def li_reuse(
     if not can_reuse(scene):
         return li_full(scene, paths, sampler, max_bounces, branches, table)
     L = np.zeros((3, len(paths)), f4)
-    tiles = WaveTiles.of(paths.pixel, paths.sample, sampler.width)
+    in_wave = WaveTiles.of(paths.pixel, paths.sample, tiles)
     first, hits = intersect_and_compact(scene, paths, sampler, 0, L, mis=True)
     if max_bounces == 0 or not len(first):
         return L
     shade = guide(prepare_shading(scene, first, hits), table)
     accumulate(L, first, direct(scene, first, shade, sampler, 0, mis=True))
     sharing = Sharing(scene, sampler, max_bounces, branches, table)
-    sharing.share(L, first, shade, branch(first, shade, sampler, 0, ways=branches), tiles)
+    sharing.share(L, first, shade, branch(first, shade, sampler, 0, ways=branches), in_wave)
     return L
 
 

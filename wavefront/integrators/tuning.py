@@ -27,7 +27,6 @@ from ..camera import Camera
 from ..compile.scene import CompiledScene
 from ..guiding import GuideTable
 from ..sampling.sampler import SamplerMaker
-from ..sampling.tiles import SIDE, STRIDE, pixels_of_tiles
 from ..stages.generate import generate
 from ..stages.interaction import material_rows
 from .ladder import li_full
@@ -35,8 +34,8 @@ from .registry import integrator_for
 from .training import spread
 
 BLOCKS, SAMPLES = 4, 4  # of each pixel: blocks of samples, which are stratified as those of a picture are
+SAMPLES_OF_SENSOR = 16  # in a block: sensors get many samples, which leave less noise of direct light
 MOST_TILES = 100  # more tell little more, and take time in large pictures
-PIXELS_PER_TILE = 1024  # of the picture, as long as there are not more tiles: a quarter of a path for each
 TILES_AT_ONCE = 64  # that are traced together, at most
 LEAST_JOBS = 2  # so that two workers have something to do, if there are as many
 MOST_BRANCHES = 4  # more gain nothing
@@ -47,6 +46,11 @@ FLOOR = 0.01  # of the squared mean of all pixels, added to that of each
 SHADOW_RAY = 0.5  # of one that finds out only whether something is in its way
 SHARED_PATH = 1.5  # of evaluating BSDFs for what the other pixels of a tile have found, besides the rays
 GUIDED_RAY = 1.375  # of a ray of a guided path
+
+
+def samples_per_block(camera: Camera) -> int:
+    """Return how many samples a block of each pixel has."""
+    return SAMPLES if camera.sensor is None else SAMPLES_OF_SENSOR
 
 
 @soa
@@ -77,13 +81,15 @@ class TrialJob:
             replace(scene, accelerator=counter),
             make_sampler(self.seed, self.camera.resolution[0]),
         )
-        count = BLOCKS * SAMPLES
+        block = samples_per_block(self.camera)
+        count = BLOCKS * block
         sample = np.repeat(np.arange(count, dtype=np.uint32), self.pixels.size)
         paths = generate(scene, self.camera, sampler, np.tile(self.pixels, count), sample)
         paths.recorder = points
-        integrator = integrator_for(li_full, self.branches, self.reuse, table if self.guided else None)
+        tiles = self.camera.tiles if self.reuse else None
+        integrator = integrator_for(li_full, self.branches, tiles, table if self.guided else None)
         L = integrator(scene, paths, sampler, self.max_bounces + self.camera.scatterings)
-        finite = np.where(np.isfinite(L), L, 0).reshape(3, BLOCKS, SAMPLES, self.pixels.size)
+        finite = np.where(np.isfinite(L), L, 0).reshape(3, BLOCKS, block, self.pixels.size)
         rays = counter.nearest + SHADOW_RAY * counter.shadow
         rays = rays * (GUIDED_RAY if self.guided else 1) + SHARED_PATH * self.reuse * sample.size
         return TrialPart(finite.mean(2, dtype=np.float64), rays, points.met)
@@ -112,7 +118,7 @@ class SecondPoints(PathRecorder):
 class Run:
     """What a setting has brought."""
 
-    variance: Doubles  # of pixels of four samples, relative to the squared mean around each
+    variance: Doubles  # of blocks of samples of pixels, relative to the squared mean around each
     rays: float
     met: Ints  # as of `TrialPart`
     paths: int  # from the camera
@@ -154,6 +160,11 @@ class Trial:
         How many of sixteen pixels, as far as the picture has them; None for as many as its size asks for.
     workers
         How many have something to do, up to two; more where there are many tiles.
+
+    Attributes
+    ----------
+    of_picture
+        Whether it is of a picture, not of sensors.
     """
 
     def __init__(
@@ -166,17 +177,10 @@ class Trial:
         workers: int = 1,
     ) -> None:
         self._camera, self._seed, self._bounces, self._do = camera, seed, min(max_bounces, BOUNCES), run
-        self._jobs = min(workers, LEAST_JOBS)
-        width, height = camera.size
-        across, down = (-(-side // (SIDE * STRIDE)) for side in camera.size)
-        tiles = tiles or min(width * height // PIXELS_PER_TILE, MOST_TILES)
-        places = across * down * STRIDE**2
-        number = np.arange(min(tiles, places), dtype=np.uint64)
-        columns, rows = pixels_of_tiles(spread(number, places).astype(np.intp), across)
-        of_tiles = [
-            (y * width + x)[(x < width) & (y < height)].astype(np.uint32)
-            for x, y in zip(columns, rows, strict=True)
-        ]
+        self._jobs, self.of_picture = min(workers, LEAST_JOBS), camera.sensor is None
+        places = camera.tiles.count
+        number = np.arange(min(tiles or min(camera.tiles.tried, MOST_TILES), places), dtype=np.uint64)
+        of_tiles = camera.tiles.pixels(spread(number, places).astype(np.intp))
         self._tiles = [pixels for pixels in of_tiles if pixels.size]
         self._scale: Doubles | None = None
         self._runs: dict[tuple[int, bool, bool], Run] = {}
@@ -206,4 +210,4 @@ class Trial:
         deviation = (radiance - mean) * math.sqrt(BLOCKS / (BLOCKS - 1))
         variance = (np.square(deviation) / self._scale).mean((0, 1))
         rays, met = sum(part.rays for part in found), np.sum([part.met for part in found], 0)
-        return Run(variance, rays, met, variance.size * BLOCKS * SAMPLES)
+        return Run(variance, rays, met, variance.size * BLOCKS * samples_per_block(self._camera))

@@ -153,7 +153,9 @@ class DaylightCoefficients:
         for start in range(0, at.size, PAIRS):
             i, h = at[start : start + PAIRS], hour[start : start + PAIRS]
             sensors = Sensors(places[i], weather.sun[h], "radiance")
-            seen = measured(self._scene, sensors, 1, {"max_bounces": 0, "progress": False}).value[:, 0]
+            seen = measured(
+                self._scene, sensors, 1, {"max_bounces": 0, "progress": False, "reuse": False}
+            ).value[:, 0]
             out[i, h] = seen * cosine[i, h] * weather.direct_normal[h]
         return out
 
@@ -228,7 +230,7 @@ def daylight_coefficients(
     places = sensors.above(subject.bounds)
     wave = max(256, WAVE_VALUES // (3 * len(patches)))
     bounds = [count * batch // BATCHES for batch in range(BATCHES + 1)]
-    given = {"wave_size": wave, **settings, "up": AUTO, "aovs": ("light_groups",)}
+    given = {"wave_size": wave, "reuse": False, **settings, "up": AUTO, "aovs": ("light_groups",)}
     both = [
         np.stack(
             [

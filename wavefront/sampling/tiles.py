@@ -1,26 +1,34 @@
-"""Interleaved tiles: pixels, some distance apart, whose paths share what they find.
+"""Tiles: pixels whose paths share what they find.
 
-The picture is divided into blocks of SIDE² cells. Each cell has STRIDE² pixels, one of each of the STRIDE²
-tiles of its block. A hash of block and cell shifts the tiles within the cell, so the pixels of a tile lie at
-irregular distances, and the noise that they share does not repeat. Tiles depend on the place in the whole
-picture alone, and are the same for every sample: a pixel that needs more samples needs them together with the
-others of its tile, in one job. Partners that change from sample to sample would lose the stratification of
-what a pixel gets from the others.
+Those of a picture are interleaved. It is divided into blocks of SIDE² cells. Each cell has STRIDE² pixels,
+one of each of the STRIDE² tiles of its block. A hash of block and cell shifts the tiles within the cell, so
+the pixels of a tile lie at irregular distances, and the noise that they share does not repeat. Tiles depend
+on the place in the whole picture alone, and are the same for every sample: a pixel that needs more samples
+needs them together with the others of its tile, in one job. Partners that change from sample to sample would
+lose the stratification of what a pixel gets from the others.
+
+Sensors at points form tiles of those that lie near each other.
 
 Source: A. Keller and W. Heidrich, "Interleaved Sampling", Eurographics Workshop on Rendering 2001.
 """
 
 from __future__ import annotations
 
+from typing import TypeAlias
+
 import numpy as np
 
 from ..arrays.soa import soa
 from ..arrays.state import Words
-from ..arrays.vec import Ints
+from ..arrays.vec import Doubles, Ints
 
 SIDE = 4  # cells of a block, in each direction; each has a pixel of every tile
 STRIDE = 7  # pixels of a cell, in each direction
 MEMBERS = SIDE * SIDE
+PIXELS_PER_TRIED = 1024  # of a picture, for each tile of a tuning run: a quarter of a path for each pixel
+POINTS_PER_TRIED, LEAST_TRIED = 1024, 8  # likewise of sensors, which get many samples; and tiles for few
+TILES_PER_BLOCK = 4  # of sensors, which get samples together: as many as the squares of a picture have pixels
+MORTON_BITS = 20  # of each coordinate
 
 
 def place_in_tiles(pixel: Words, width: int) -> tuple[Ints, Ints]:
@@ -62,11 +70,6 @@ def cell_shifts(block_x: Words, block_y: Words, member: Words) -> tuple[Words, W
     return shift_x, _divided(rest, STRIDE)[1]
 
 
-def block_of(pixel: Words, width: int) -> Ints:
-    """Return the number of the block of each pixel (n,), which has whole tiles; arguments as above."""
-    return place_in_tiles(pixel, width)[0] // STRIDE**2
-
-
 def pixels_of_tiles(place: Ints, across: int) -> tuple[Ints, Ints]:
     """Return columns and rows (k, MEMBERS) of the pixels of tiles (k,), numbered block by block from 0 on.
 
@@ -81,9 +84,96 @@ def pixels_of_tiles(place: Ints, across: int) -> tuple[Ints, Ints]:
     return x, y
 
 
-def others_in_tile(pixel: Words, one: int, width: int) -> Ints:
-    """Return which of pixels (n,) share the tile of pixel[one], without that one; arguments as above."""
-    tile, _ = place_in_tiles(pixel, width)
+@soa
+class PictureTiles:
+    """The interleaved tiles of a picture."""
+
+    width: int  # pixels
+    height: int
+
+    def place(self, pixel: Words) -> tuple[Ints, Ints]:
+        """Return tile and member of pixels (n,), as `place_in_tiles`."""
+        return place_in_tiles(pixel, self.width)
+
+    def block_of(self, pixel: Words) -> Ints:
+        """Return the number of the block of each pixel (n,), which has whole tiles."""
+        return self.place(pixel)[0] // STRIDE**2
+
+    @property
+    def count(self) -> int:
+        """How many there are, with those that have no pixel."""
+        return -(-self.width // (SIDE * STRIDE)) * -(-self.height // (SIDE * STRIDE)) * STRIDE**2
+
+    @property
+    def tried(self) -> int:
+        """How many tiles a tuning run has, at most."""
+        return self.width * self.height // PIXELS_PER_TRIED
+
+    def pixels(self, number: Ints) -> list[Words]:
+        """Return the pixels of each of some tiles (k,)."""
+        columns, rows = pixels_of_tiles(number, -(-self.width // (SIDE * STRIDE)))
+        return [
+            (y * self.width + x)[(x < self.width) & (y < self.height)].astype(np.uint32)
+            for x, y in zip(columns, rows, strict=True)
+        ]
+
+
+@soa
+class PointTiles:
+    """The tiles of sensors: those that follow each other in an order of all of them."""
+
+    rank: Ints  # (n,) place of each pixel in this order
+
+    def place(self, pixel: Words) -> tuple[Ints, Ints]:
+        """Return tile and member of pixels (n,), as `place_in_tiles`."""
+        return np.divmod(self.rank.take(pixel), MEMBERS)
+
+    def block_of(self, pixel: Words) -> Ints:
+        """Return the number of the block of each pixel (n,), which has whole tiles."""
+        return self.place(pixel)[0] // TILES_PER_BLOCK
+
+    @property
+    def count(self) -> int:
+        """How many there are."""
+        return -(-self.rank.size // MEMBERS)
+
+    @property
+    def tried(self) -> int:
+        """How many tiles a tuning run has, at most."""
+        return max(LEAST_TRIED, self.rank.size // POINTS_PER_TRIED)
+
+    def pixels(self, number: Ints) -> list[Words]:
+        """Return the pixels of each of some tiles (k,)."""
+        order = np.argsort(self.rank).astype(np.uint32)
+        return [order[MEMBERS * each : MEMBERS * (each + 1)] for each in number.tolist()]
+
+
+Tiles: TypeAlias = PictureTiles | PointTiles
+
+
+def nearby_ranks(points: Doubles, directions: Doubles) -> Ints:
+    """Return the place (n,) of each point in an order in which near points of like directions lie together.
+
+    First come those whose directions have the same largest component, then those that are near along a
+    Morton curve (G. M. Morton, 1966).
+    """
+    axis = np.abs(directions).argmax(1)
+    facing = 2 * axis + (directions[np.arange(len(axis)), axis] < 0)
+    low = points.min(0)
+    size = np.max(points.max(0) - low) or 1.0
+    cells = ((points - low) / size * (2**MORTON_BITS - 1)).astype(np.int64)
+    key = np.zeros(len(points), np.int64)
+    for bit in range(MORTON_BITS):
+        for k in range(3):
+            key |= (cells[:, k] >> bit & 1) << (3 * bit + k)
+    rank = np.empty(len(points), np.intp)
+    rank[np.lexsort((key, facing))] = np.arange(len(points))
+    return rank
+
+
+def others_in_tile(pixel: Words, one: int, tiles: Tiles) -> Ints:
+    """Return which of pixels (n,) share the tile of pixel[one], without that one."""
+    tile, _ = tiles.place(pixel)
     same = np.flatnonzero(tile == tile[one])
     return same[same != one]
 
@@ -100,9 +190,9 @@ class WaveTiles:
     count: int  # number of tiles
 
     @classmethod
-    def of(cls, pixel: Words, sample: Words, width: int) -> WaveTiles:
+    def of(cls, pixel: Words, sample: Words, tiles: Tiles) -> WaveTiles:
         """Return the tiles of paths, given pixels (n,) and samples (n,)."""
-        tile, member = place_in_tiles(pixel, width)
+        tile, member = tiles.place(pixel)
         rank = np.cumsum(np.bincount(tile, minlength=1) > 0)  # from 1 on, among the tiles of the wave
         in_turn = (sample - sample.min(initial=2**32 - 1)).astype(np.intp)
         number = in_turn * rank[-1] + rank.take(tile) - 1
@@ -125,13 +215,13 @@ class WaveTiles:
         return grid
 
 
-def whole_tiles(pixel: Words, width: int) -> tuple[Ints, Ints]:
+def whole_tiles(pixel: Words, tiles: Tiles) -> tuple[Ints, Ints]:
     """Return an order (n,) of pixels (n,) in which the members of each tile follow each other, and its cuts.
 
     Cuts (k,) are the places in this order at which a tile ends, rising. Tiles come in the order of
     their last pixels, so that as many whole rows as possible lie side by side.
     """
-    tile, _ = place_in_tiles(pixel, width)
+    tile, _ = tiles.place(pixel)
     by_tile = np.argsort(tile, kind="stable")
     ends = np.append(np.flatnonzero(np.diff(tile.take(by_tile))) + 1, pixel.size)
     sizes = np.diff(ends, prepend=0)

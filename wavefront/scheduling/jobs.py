@@ -18,7 +18,7 @@ from ..camera import Camera
 from ..core.plural import plural
 from ..film.aov_samples import AovSamples
 from ..integrators.light_tracing import Splats
-from ..sampling.tiles import block_of, whole_tiles
+from ..sampling.tiles import Tiles, whole_tiles
 
 DEEPEST = 8  # samples of a pixel that a job should have: the more, the less it costs to send and add sums
 DEPTH_SHARE = 1 / 2  # of the samples so far, so that the pixels of a render that is ended differ by no more,
@@ -40,16 +40,21 @@ class CameraJob:
     reuse: bool = False  # pixels share paths, so those of a tile (sampling/tiles.py) belong in one job
     guided: bool = False  # by what the tracer has for it
 
+    @property
+    def tiles(self) -> Tiles | None:
+        """The tiles whose pixels share paths; None where none do."""
+        return self.camera.tiles if self.reuse else None
+
     def parts(self, pixels: Words, width: int) -> Iterator[Words]:
         """Split pixels (k,) into parts of at most `width`, or of one tile where tiles stay whole."""
-        if not self.reuse:
+        if self.tiles is None:
             for start in range(0, pixels.size, width):
                 yield pixels[start : start + width]
             return
         if pixels.size <= width:
             yield pixels
             return
-        order, cuts = whole_tiles(self.camera.address(pixels), self.camera.resolution[0])
+        order, cuts = whole_tiles(self.camera.address(pixels), self.tiles)
         start = 0
         while start < pixels.size:
             fitting = int(np.searchsorted(cuts, start + width, side="right"))
@@ -66,8 +71,8 @@ class CameraJob:
         """
         width, height = self.camera.size
         pixels = np.arange(width * height, dtype=np.uint32)
-        if self.reuse:
-            return block_of(self.camera.address(pixels), self.camera.resolution[0])
+        if self.tiles is not None:
+            return self.tiles.block_of(self.camera.address(pixels))
         return pixels // width // SQUARE * np.intp(-(-width // SQUARE)) + pixels % width // SQUARE
 
     def __reduce__(self) -> tuple[Any, ...]:

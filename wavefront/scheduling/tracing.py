@@ -130,7 +130,7 @@ def _trace_wave(tracer: Tracer, monitor: WaveMonitor, job: Job) -> WaveResult:
     if recorder is not None:
         recorder.prepare(paths)
     table = tracer.table if job.view.guided else None
-    integrator = integrator_for(tracer.integrator, job.view.branches, job.view.reuse, table)
+    integrator = integrator_for(tracer.integrator, job.view.branches, job.view.tiles, table)
     radiance = integrator(scene, paths, sampler, tracer.max_bounces + camera.scatterings)
     _check_radiance(integrator, radiance, k * n)
     finite = np.logical_and.reduce(np.isfinite(radiance))

@@ -16,7 +16,7 @@ from ..guiding import GuideTable
 from ..integrators.training import train
 from ..integrators.tuning import MOST_BRANCHES, JobsRunner, Run, Trial
 from ..sampling.sampler import make_sampler
-from ..sampling.tiles import SIDE, STRIDE
+from ..sampling.tiles import MEMBERS, SIDE, STRIDE
 from ..settings import AUTO, Settings
 from ..settings.combinations import left_out
 from ..stages.glossy_points import glossy_materials
@@ -90,7 +90,7 @@ def choose(
         trial = Trial(whole, seed, bounces, run, GUIDE_TILES, workers)
         plain, guided = (_branched(settings, trial, replace(asked, guided=each)) for each in (False, True))
         return guided if _cost(trial, guided, plain) < GAIN else plain
-    if camera.sensor is None and settings.is_full and _tries_something(settings, scene, whole):
+    if settings.is_full and _tries_something(settings, scene, whole):
         return _tried(settings, scene, whole, Trial(whole, seed, bounces, run, workers=workers), asked)
     return asked
 
@@ -124,8 +124,8 @@ def _may_gain(scene: CompiledScene, found: Run, light_is_rare: bool) -> bool:
 
 
 def _branched(settings: Settings, trial: Trial, choice: Choice) -> Choice:
-    """Return a choice with as many branches as pay."""
-    if settings.values["branches"] == AUTO and not choice.reuse:
+    """Return a choice with as many branches as pay; paths from sensors have no first ray to share."""
+    if settings.values["branches"] == AUTO and not choice.reuse and trial.of_picture:
         for branches in (2, MOST_BRANCHES):
             more = replace(choice, branches=branches)
             if _cost(trial, more, choice) >= GAIN:
@@ -149,7 +149,7 @@ def _tries_something(settings: Settings, scene: CompiledScene, camera: Camera) -
     values = settings.values
     if values["branches"] != AUTO or values["reuse"] is True or values["max_bounces"] < 2:
         return False
-    if camera.size[0] * camera.size[1] < LEAST_PIXELS:
+    if camera.size[0] * camera.size[1] < (LEAST_PIXELS if camera.sensor is None else MEMBERS):
         return False
     rough = any(not bsdf.specular for bsdf in scene.materials.groups)
     return rough and bool(scene.lights.kinds)
@@ -158,4 +158,4 @@ def _tries_something(settings: Settings, scene: CompiledScene, camera: Camera) -
 def _may_reuse(settings: Settings, camera: Camera) -> bool:
     """Return whether settings and size of a picture allow that its pixels share paths by themselves."""
     free = settings.values["reuse"] == AUTO and not left_out(settings.values, "reuse")
-    return free and min(camera.size) >= SIDE * STRIDE
+    return free and (camera.sensor is not None or min(camera.size) >= SIDE * STRIDE)

@@ -139,5 +139,5 @@ def _cause_of_bad_sample(plan: Plan, loop: RenderLoop, pixel: int, sample: int) 
     camera, pixels = loop.view.camera, np.array([pixel], np.uint32)
     if plan.choice.reuse:
         every = camera.address(np.arange(camera.size[0] * camera.size[1], dtype=np.uint32))
-        pixels = np.append(pixels, others_in_tile(every, pixel, camera.resolution[0]).astype(np.uint32))
+        pixels = np.append(pixels, others_in_tile(every, pixel, camera.tiles).astype(np.uint32))
     return first_nan(plan.scene.lighted, plan.tracer, loop.view, pixels, sample)

@@ -45,7 +45,7 @@ def first_nan(user_scene: Scene, tracer: Tracer, view: CameraJob, pixels: Words,
     paths = generate(tracer.scene, camera, sampler, pixels, samples, tracer.filter)
     recorder = paths.recorder = NanRecorder(user_scene, tracer.layers)
     table = tracer.table if view.guided else None
-    integrator = integrator_for(tracer.integrator, view.branches, view.reuse, table)
+    integrator = integrator_for(tracer.integrator, view.branches, view.tiles, table)
     with np.errstate(all="ignore"):
         integrator(tracer.scene, paths, sampler, tracer.max_bounces + camera.scatterings)
         return recorder.place or _nan_of_light(tracer, camera, pixels, samples)

@@ -15,7 +15,7 @@ from typing import TypeAlias
 import numpy as np
 
 from ..arrays.state import Hits, Paths, SurfaceInteraction
-from ..arrays.vec import Floats, Lanes, broadcast, column, f4, highest
+from ..arrays.vec import Floats, Ints, Lanes, broadcast, column, f4, highest, take
 from ..bsdfs import Bsdf, BsdfSample
 from ..camera import Camera
 from ..compile.scene import CompiledScene
@@ -41,6 +41,11 @@ class SensorBsdf(Bsdf):
     """
 
     view_independent = True
+
+    @property
+    def lambertian(self) -> bool:
+        """Whether the light counts by its cosine, as that which a matte surface of albedo π reflects."""
+        return not self.transmissive
 
     def __init__(self, warp: Warp, density: Warp, total: float, sphere: bool) -> None:
         self.warp, self.density, self.total, self.transmissive = warp, density, f4(total), sphere
@@ -78,6 +83,29 @@ def at_sensors(paths: Paths) -> Hits:
     return Hits(broadcast(f4(0), n), paths.exclude_prim, None, None)
 
 
+class SensorShading(Shading):
+    """Sensors, ready to be shaded: no material of the scene is theirs."""
+
+    __slots__ = ()
+
+    def at(self, lanes: Ints) -> SensorShading:
+        """Return the sensors of some lanes (k,), as `Shading.at`."""
+        surface = self.surface.take(lanes)
+        surface.ns = surface.ng
+        groups: list[tuple[Lanes, Bsdf]] = [(slice(0, lanes.size), self.groups[0][1])]
+        volume = None if self.volume is None else np.arange(lanes.size)
+        up, start = np.broadcast_to(UP, (3, lanes.size)), take(self.start, lanes)
+        return SensorShading(
+            surface, self.frame.take(lanes), up, start, groups, self.guidance_at(lanes), volume=volume
+        )
+
+    def albedo(self) -> Floats:
+        """Return by what cosine over π is multiplied, (3, n)."""
+        sensor = self.groups[0][1]
+        assert isinstance(sensor, SensorBsdf)
+        return np.broadcast_to(sensor.total, self.wo.shape)
+
+
 def sensor_shading(scene: CompiledScene, paths: Paths) -> Shading:
     """Return the sensors at which paths start, ready to be shaded; their normals are −direction."""
     n, normal = len(paths), -paths.direction
@@ -94,6 +122,6 @@ def sensor_shading(scene: CompiledScene, paths: Paths) -> Shading:
     groups: list[tuple[Lanes, Bsdf]] = [(slice(0, n), paths.sensor)]
     receiver = receiver_of(surface, groups) if scene.lights.takes_receiver else None
     up, volume = np.broadcast_to(UP, normal.shape), np.arange(n) if paths.sensor.transmissive else None
-    return Shading(
+    return SensorShading(
         surface, surface.frame(), up, origin_above(surface), groups, receiver=receiver, volume=volume
     )
