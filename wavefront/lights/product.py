@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from ..arrays.elementary import sin_cos_turns
-from ..arrays.vec import Doubles, Floats, Ints, f4
+from ..arrays.vec import Doubles, Floats, Ints, f4, take
 from ..sampling.discrete import Inversion, within_cell
 
 NORMALS = 16  # squared: the normals of the table, on an octahedron
@@ -110,15 +110,15 @@ class CosineProduct:
         flat, v = self._rows.find(u[1], normal)
         row = flat - normal * rows
         cell, x = self._columns.find(u[0], flat)
-        chance = self._chance.take(cell)
+        chance = take(self._chance, cell)
         column = cell - flat * columns
         of = row * columns + column
         flat, v = self._texel_rows.find(v, of)
-        texel_row = flat - of * self._texel_rows.items + self._row_edges.take(row)
+        texel_row = flat - of * self._texel_rows.items + take(self._row_edges, row)
         of = texel_row * columns + column
         flat, x = self._texel_columns.find(x, of)
-        texel_column = flat - of * self._texel_columns.items + self._column_edges.take(column)
-        pdf = chance * self._density.take(texel_row * width + texel_column)
+        texel_column = flat - of * self._texel_columns.items + take(self._column_edges, column)
+        pdf = chance * take(self._density, texel_row * width + texel_column)
         return within_cell(texel_column, x, width), within_cell(texel_row, v, height), pdf
 
     def pdf(self, x: Floats, y: Floats, normal: Ints) -> Floats:
@@ -126,8 +126,8 @@ class CosineProduct:
         (rows, columns), (height, width) = self._cells, self.shape
         column = np.clip((x * f4(width)).astype(np.intp), 0, width - 1)
         row = np.clip((y * f4(height)).astype(np.intp), 0, height - 1)
-        cell = (normal * rows + self._cell_row.take(row)) * columns + self._cell_column.take(column)
-        return self._chance.take(cell) * self._density.take(row * width + column)
+        cell = (normal * rows + take(self._cell_row, row)) * columns + take(self._cell_column, column)
+        return take(self._chance, cell) * take(self._density, row * width + column)
 
 
 def _rows_of_one(weights: Doubles) -> Doubles:
@@ -158,6 +158,9 @@ def octahedral_bins(normal: Floats) -> Ints:
             np.where(below, np.copysign(f4(1) - np.abs(x), y), y),
         )
     half = f4(NORMALS / 2)
-    i = np.clip(np.nan_to_num((x + f4(1)) * half), 0, NORMALS - 1).astype(np.intp)
-    j = np.clip(np.nan_to_num((y + f4(1)) * half), 0, NORMALS - 1).astype(np.intp)
-    return i * NORMALS + j
+    low, high = f4(0), f4(NORMALS - 1)  # `fmax` takes NaN for the least
+    i = np.fmin(np.fmax((x + f4(1)) * half, low), high).astype(np.intp)
+    j = np.fmin(np.fmax((y + f4(1)) * half, low), high).astype(np.intp)
+    i *= NORMALS
+    i += j
+    return i

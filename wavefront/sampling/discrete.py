@@ -8,7 +8,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ..arrays.vec import BELOW_ONE, Doubles, Floats, Ints, f4
+from ..arrays.vec import BELOW_ONE, Doubles, Floats, Ints, f4, take
 from ..core.errors import SceneError
 from ..core.plural import plural
 
@@ -76,14 +76,14 @@ class Inversion:
         cell = (u * f4(self._cells)).astype(np.intp)
         if row is not None:
             cell += row * self._cells
-        flat = self._first.take(cell).astype(np.intp)
-        short = np.flatnonzero(self._edge.take(flat) <= u)
+        flat = take(self._first, cell).astype(np.intp)
+        short = np.flatnonzero(take(self._edge, flat) <= u)
         for _ in range(2):  # most lanes end after one or two steps
             flat[short] += 1
             short = short[self._edge.take(flat[short]) <= u[short]]
         if len(short):
             flat[short] = self._searched(flat[short], u[short])
-        rest = (u - self._start.take(flat)) / self._probability.take(flat)
+        rest = (u - take(self._start, flat)) / take(self._probability, flat)
         return flat, np.clip(rest, f4(0), BELOW_ONE)
 
     def _searched(self, low: Ints, u: Floats) -> Ints:

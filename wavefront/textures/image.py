@@ -184,21 +184,27 @@ class Texture(BaseTexture):
     def _bilinear(self, x: Floats, y: Floats) -> list[Floats]:
         left, right, fx = _neighbors(x, self.size[0], self.wrap[0])
         top, bottom, fy = _neighbors(y, self.size[1], self.wrap[1])
-        width = self.size[0]
+        for columns in (left, right):
+            columns *= self._stride
+        for rows in (top, bottom):
+            rows *= self._stride * self.size[0]
+        corners = top + left, top + right, bottom + left, bottom + right
         out = []
         for k in range(len(self._channels)):
-            upper = _mix(self._decoded(top * width + left, k), self._decoded(top * width + right, k), fx)
-            lower = _mix(
-                self._decoded(bottom * width + left, k), self._decoded(bottom * width + right, k), fx
-            )
-            out.append(_mix(upper, lower, fy))
+            a, b, c, d = (self._values(first, k) for first in corners)
+            out.append(_mix(_mix(a, b, fx), _mix(c, d, fx), fy))
         return out
 
     def _decoded(self, texel: Ints, k: int) -> Floats:
         """Return the linear values of the k-th chosen channel of texels (n,)."""
-        codes = self._texels.take(texel * self._stride + self._channels[k])
+        return self._values(texel * self._stride, k)
+
+    def _values(self, first: Ints, k: int) -> Floats:
+        """Return the same of texels given by where their first channel is stored."""
+        # "wrap" is twice as fast as the default, which checks each index
+        codes = self._texels[self._channels[k] :].take(first, mode="wrap")
         table = self._tables[k]
-        return codes if table is None else table.take(codes)
+        return codes if table is None else table.take(codes, mode="wrap")
 
 
 class StoredImage(NamedTuple):
@@ -310,7 +316,9 @@ def _neighbors(x: Floats, size: int, wrap: str) -> tuple[Ints, Ints, Floats]:
     low = np.floor(x)
     before = low.astype(np.intp)
     after = before + 1
-    if wrap == "repeat":
+    if wrap == "repeat" and not size & (size - 1):  # a power of two: ten times as fast
+        before, after = before & (size - 1), after & (size - 1)
+    elif wrap == "repeat":
         before, after = before % size, after % size
     else:  # the edge texel continues, also where the image is mirrored
         before, after = np.clip(before, 0, size - 1), np.clip(after, 0, size - 1)
