@@ -150,7 +150,7 @@ class Dielectric(RefractiveBsdf):
         return self.dispersive or self.has_film
 
     def albedo(self, wo: Floats) -> Floats:
-        """Return the tints of reflection and refraction, weighed by the reflectance of a smooth surface."""
+        """Return the tints of reflection and refraction, weighted by the reflectance of a smooth surface."""
         reflected = (
             fresnel_channels(self, wo[2])[0] if self._split else fresnel_dielectric(wo[2], self.eta)[0]
         )

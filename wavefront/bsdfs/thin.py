@@ -44,7 +44,7 @@ class ThinDielectric(RefractiveBsdf):
     thin = True
 
     def albedo(self, wo: Floats) -> Floats:
-        """Return the tints of both sides, weighed by the reflectance of a smooth sheet."""
+        """Return the tints of both sides, weighted by the reflectance of a smooth sheet."""
         return self.transmittance + (self.reflectance - self.transmittance) * self._reflected(wo[2])
 
     def evaluate(self, wo: Floats, wi: Floats) -> tuple[Floats, Floats]:

@@ -152,9 +152,9 @@ class IESLight(LightAtPoint):
     dimming
         Factor of the light, at least 0.
     color
-        Linear RGB or the name of a color; its own size does not count.
+        Linear RGB or the name of a color; its brightness does not count.
     tilt
-        Degrees from upright, where the file says how the lamp's light depends on it. It turns nothing.
+        Degrees from upright, for files with a table of TILT. It does not turn the luminaire.
     efficacy
         lm/W of white, as in `from_photometric`.
     group

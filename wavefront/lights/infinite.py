@@ -61,7 +61,7 @@ class InfiniteLight(LightRecord):
 class EnvironmentSum(InfiniteLight):
     """The sum of several lights at infinity, sampled one at a time by their power.
 
-    Its pdf is the mixture's, so that each sample is weighed against all ways to draw it
+    Its pdf is the mixture's, so that each sample is weighted against all ways to draw it
     (E. Veach, thesis 1997, §9.2.2: the one-sample model with the balance heuristic).
     """
 

@@ -50,7 +50,7 @@ class SkyPatches:
 
     @property
     def projected(self) -> Doubles:
-        """Solid angles of the patches of the sky on a level plane, (patches − 1,) sr; they add up to π."""
+        """Solid angles of the sky's patches, projected on a horizontal plane, (patches − 1,) sr; in all π."""
         return np.repeat(np.pi * np.diff(self.sines * self.sines) / self.per_row, self.per_row)
 
     def number(self, wi: Floats) -> Ints:
@@ -76,7 +76,7 @@ class SkyPatches:
         return sum(axis[:, None, None] * each for axis, each in zip(self.axes.T, local, strict=True))
 
     def weights(self, along: int) -> Doubles:
-        """Return a level plane's weights (patches − 1, along²) for means over `directions(along)`."""
+        """Return a horizontal plane's weights (patches − 1, along²) for means over `directions(along)`."""
         cosine = (self.axes[:, 2, None, None] * self.directions(along)).sum(0)
         return np.asarray(cosine / cosine.sum(1, keepdims=True))
 

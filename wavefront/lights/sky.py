@@ -94,7 +94,7 @@ class Sky(Parametrized, Light):
     scale
         W·sr⁻¹·m⁻² for each unit of the function; None for the diffuse irradiance of `horizontal`.
     horizontal
-        Diffuse irradiance of a level plane under the free sky, W·m⁻², a color.
+        Diffuse irradiance of a horizontal plane under the free sky, W·m⁻², a color.
     direct_normal
         Irradiance by the sun alone of a surface that faces it, W·m⁻², a color; 0 for no disk.
     ground
@@ -105,7 +105,7 @@ class Sky(Parametrized, Light):
     Attributes
     ----------
     diffuse_horizontal
-        (3,) irradiance of a level plane by the sky alone, W·m⁻².
+        (3,) irradiance of a horizontal plane by the sky alone, W·m⁻².
     direct_normal
         (3,) irradiance by the sun of a surface that faces it, W·m⁻².
     sun, up
@@ -233,7 +233,7 @@ class Sky(Parametrized, Light):
         direct_normal
             Irradiance by the sun of a surface that faces it, W·m⁻², at least 0.
         diffuse_horizontal
-            Irradiance of a level plane by the sky, W·m⁻², above 0.
+            Irradiance of a horizontal plane by the sky, W·m⁻², above 0.
         sun
             (3,) direction to the sun, of any length, above the horizon.
         illuminance

@@ -103,7 +103,7 @@ class DaylightCoefficients:
     def sky_radiance(self, sky: Any) -> Doubles:
         """Return the mean radiance (p,) of each patch of a `Sky`, without the sun's disk; its luminance.
 
-        Means are weighed as on a level plane, so that its irradiance is kept.
+        Means are weighted as on a horizontal plane, so that its irradiance is kept.
         """
         directions = self.patches.directions(ALONG)
         weights = self.patches.weights(ALONG)

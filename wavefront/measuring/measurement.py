@@ -35,7 +35,7 @@ class Measurement:
     samples
         (n,) of each point.
     points, normals
-        (n, 3) of the sensors, scene units; what radiance has for directions are its normals.
+        (n, 3) of the sensors, scene units. For radiance the normals are the directions.
     kind
         "irradiance", "fluence", "radiance", "arriving flux" or "leaving flux".
     metadata

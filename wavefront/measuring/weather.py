@@ -23,14 +23,14 @@ MISSING = 9999  # stands for a value that was not measured
 
 
 class Weather:
-    """Irradiances and suns of many hours.
+    """The irradiances and the direction to the sun of many hours.
 
     Parameters
     ----------
     direct_normal
         (h,) irradiance by the sun of a surface that faces it, W·m⁻².
     diffuse_horizontal
-        (h,) irradiance of a level plane by the sky, W·m⁻².
+        (h,) irradiance of a horizontal plane by the sky, W·m⁻².
     sun
         (h, 3) directions to the sun, of any length.
 

@@ -17,8 +17,8 @@ USEFUL = 100.0, 3000.0  # lux
 class Year:
     """The light at points in each hour, from `DaylightCoefficients.annual`.
 
-    Errors are those of the coefficients; the model of the sky has its own, as does the weather. They come
-    from estimates that each leave out one part of the samples (the jackknife), and so hold for all figures.
+    Errors are those of the coefficients; the model of the sky and the weather have errors of their own. They
+    are estimated by the jackknife, which leaves out one part of the samples at a time, for all figures.
 
     Parameters
     ----------

@@ -19,7 +19,7 @@ from ..compile.scene import ROULETTE_AFTER
 from ..core.memory import memory_size
 from ..core.progress import Progress
 from ..core.registry import Registry
-from ..film.aov_names import chosen_aovs
+from ..film.aov_names import AOVS, BOXES, KEYED_AOVS, chosen_aovs
 from ..integrators import INTEGRATORS, Integrator
 from ..lights.choice import LightSamplerMaker
 from ..lights.samplers import LIGHT_SAMPLERS
@@ -52,6 +52,7 @@ from .checks import (
 from .combinations import told
 
 MAX_BRANCHES = 64
+AOV_LIST = ", ".join(f'"{name}"' for name in (*AOVS, *KEYED_AOVS, BOXES))
 
 
 @dataclass(frozen=True)
@@ -459,11 +460,8 @@ class RenderSettings(TypedDict, total=False):
         str | Sequence[str],
         Setting(
             (),
-            'AOVs, the layers of the image beside the picture, by name: "position", "depth", "distance", '
-            '"normal", "normal_geometric", "uv", "shape_id", "instance_id", "material_id", "alpha", '
-            '"albedo", "direct", "indirect", "denoising_albedo", "denoising_normal", "light_groups", '
-            '"coverage", "boxes", or "all" for all but the last three. docs/layers.md says what each '
-            "holds, and what it costs.",
+            f"AOVs, the layers of the image beside the picture, by name: {AOV_LIST}, "
+            'or "all" for all but the last three. docs/layers.md says what each holds, and what it costs.',
             option="AOV to render beside the picture, or all; can be given several times",
             flag="aov",
             check=chosen_aovs,

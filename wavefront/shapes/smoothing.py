@@ -37,9 +37,9 @@ def crease_normals(vertices: Doubles, faces: Ints, degrees: float) -> Doubles | 
     """Return unit normals at the corners of faces, (m, 3, 3); None if all are those of the facets.
 
     The normal of a corner is the average of the normals of the faces at its vertex that are within a crease
-    angle of its own face, weighed by their angles there (Thürmer and Wüthrich 1998, "Computing vertex normals
-    from polygonal facets", J. Graphics Tools 3(1)) and by their areas, so that a plane stays flat beside a
-    narrow fillet. Vertices in one place count as one.
+    angle of its own face, weighted by their angles there (Thürmer and Wüthrich 1998, "Computing vertex
+    normals from polygonal facets", J. Graphics Tools 3(1)) and by their areas, so that a plane stays flat
+    beside a narrow fillet. Vertices in one place count as one.
 
     Parameters
     ----------
