@@ -27,6 +27,7 @@ GUIDE_HINT = "most light is hard to find here: guide=True may pay (docs/guiding.
 # Variance times rays must fall below this part: rays tell the cost to about a tenth, and a trial may miss the
 # few paths that find most of the light.
 GAIN = 0.85
+GAIN_OF_BRANCHES = 0.9  # likewise; costs of branches are known to 0.04 where few fireflies make the noise
 OUTLIERS = 0.02  # part of the pixels, the noisiest, that do not count
 OUTLIERS_OF_SHARED = 0.005  # likewise, for re-use, which may bring most where few pixels hold the noise
 GAIN_BESIDE_GLOSS = (
@@ -128,7 +129,7 @@ def _branched(settings: Settings, trial: Trial, choice: Choice) -> Choice:
     if settings.values["branches"] == AUTO and not choice.reuse and trial.of_picture:
         for branches in (2, MOST_BRANCHES):
             more = replace(choice, branches=branches)
-            if _cost(trial, more, choice) >= GAIN:
+            if _cost(trial, more, choice) >= GAIN_OF_BRANCHES:
                 break
             choice = more
     return choice
