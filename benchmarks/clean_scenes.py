@@ -17,8 +17,10 @@ from wavefront.scene.lighting import PRESETS
 sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "examples"))
 from cornell_box import cornell_box
 
-GOLD = wf.Conductor((0.143, 0.374, 1.442), (3.983, 2.386, 1.603), roughness=0.3)
-COATED = wf.Mix(wf.Diffuse((0.45, 0.08, 0.06)), wf.Conductor(1, 1000, roughness=0.2), 0.12)
+GOLD = wf.Conductor((0.143, 0.374, 1.442), (3.983, 2.386, 1.603), roughness=0.3, multiscatter=False)
+COATED = wf.Mix(
+    wf.Diffuse((0.45, 0.08, 0.06)), wf.Conductor(1, 1000, roughness=0.2, multiscatter=False), 0.12
+)
 FLOOR = wf.Rectangle((-6, 0, 6), (12, 0, 0), (0, 0, -12), material=wf.Diffuse(0.45))
 
 

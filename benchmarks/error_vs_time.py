@@ -8,9 +8,9 @@ Sides: wavefront by each method of the scene, or by those
 of --methods, in numpy and embree; Mitsuba `llvm_ad_rgb` and `scalar_rgb`, each with `independent` and
 `multijitter`; with `--bpy-python`, Cycles with its own path guiding on the box and the hard scenes, and with
 Open Image Denoise on the box. All draw the same shapes with as many bounces, a box filter and a worker per
-core; Cycles has a sphere of 20 480 triangles in place of each ball. The reference is the mean of two
-converged renders, one of wavefront and one of Mitsuba, weighted by their noise, whose means are compared
-first. Printed are, for each side:
+core; rough metals scatter once, as Mitsuba's do; Cycles has a sphere of 20 480 triangles in place of each
+ball. The reference is the mean of two converged renders, one of wavefront and one of Mitsuba, weighted by
+their noise, whose means are compared first. Printed are, for each side:
 
 - error and wall time at each sample count (with four branches a fourth of it), warm: medians over the
   repeats, the sides in turn, forwards and backwards. The scene of Mitsuba is loaded once, beforehand. Cycles
@@ -103,7 +103,7 @@ def mesh_scene(data: Path | None, size: int) -> wf.Scene:
         )
         vertices = vertices * wave[:, None] * 0.7
     vertices = vertices - (0, vertices[:, 1].min(), 0) + (-0.55, 0, 0)
-    gold = wf.Conductor((0.143, 0.374, 1.442), (3.983, 2.386, 1.603), roughness=0.4)
+    gold = wf.Conductor((0.143, 0.374, 1.442), (3.983, 2.386, 1.603), roughness=0.4, multiscatter=False)
     round_vertices, round_faces = ball(5)
     shapes = [
         wf.Mesh(vertices, faces, material=gold, name="metal"),
@@ -129,7 +129,7 @@ def hdri_scene(size: int) -> wf.Scene:
 
     torus = trimesh.creation.torus(0.5, 0.2)
     flat = torus.vertices[:, [1, 2, 0]] + (0.75, 0.2, 0.3)  # its axis is upright
-    gold = wf.Conductor((0.143, 0.374, 1.442), (3.983, 2.386, 1.603), roughness=0.35)
+    gold = wf.Conductor((0.143, 0.374, 1.442), (3.983, 2.386, 1.603), roughness=0.35, multiscatter=False)
     shapes = [
         FLOOR,
         wf.Sphere((-0.7, 0.65, 0), 0.65, material=wf.Diffuse(0.7)),
