@@ -332,6 +332,47 @@ def test_the_first_time_counts(tmp_path: Path) -> None:
     )
     (mesh,) = load(tmp_path, body, "metersPerUnit = 1\nstartTimeCode = 5\nendTimeCode = 9").shapes
     assert mesh.vertices[:, 0].min() == 1
+    (mesh,) = load(tmp_path, body, "metersPerUnit = 1\nstartTimeCode = 5\nendTimeCode = 9", time=7).shapes
+    assert mesh.vertices[:, 0].min() == 1.5
+    with pytest.raises(wf.SceneError, match="time is nan; it must be finite"):
+        load(tmp_path, body, time=np.nan)
+
+
+def test_lights_at_points(tmp_path: Path) -> None:
+    common = """    float inputs:radius = 0.5
+    float inputs:intensity = 3
+    bool treatAsPoint = 1
+    double3 xformOp:translate = (0, 4, 0)
+    float xformOp:rotateX = -90
+    uniform token[] xformOpOrder = ["xformOp:translate", "xformOp:rotateX"]
+"""
+    cone = "    float inputs:shaping:cone:angle = 30\n    float inputs:shaping:cone:softness = 0.25\n"
+    body = f'def SphereLight "a"\n{{\n{common}}}\ndef SphereLight "b"\n{{\n{common}{cone}}}\n'
+    point, spot = load(tmp_path, MESH + body).lights
+    assert (type(point), type(spot)) == (wf.PointLight, wf.SpotLight)
+    for light in (point, spot):
+        np.testing.assert_allclose(light.position, [0, 4, 0], atol=1e-6)
+        np.testing.assert_allclose(np.ravel(light.intensity), 3 * np.pi / 4, rtol=1e-6)
+    np.testing.assert_allclose(spot.direction, [0, -1, 0], atol=1e-6)
+    assert (spot.angle, spot.blend) == (60, 0.25)
+
+
+def test_panels_show_textures_and_lights_have_a_temperature(tmp_path: Path) -> None:
+    write_image(tmp_path / "a.exr", np.array([[[1, 0, 0], [0, 1, 0]], [[0, 0, 1], [1, 1, 1]]], np.float32))
+    warm = "    bool inputs:enableColorTemperature = 1\n    float inputs:colorTemperature = 3000\n"
+    own = "    asset inputs:texture:file = @a.exr@\n    float inputs:intensity = 2\n"
+    body = f'def RectLight "panel"\n{{\n{own}}}\n'
+    ball = f'def SphereLight "ball"\n{{\n    float inputs:intensity = 2\n{warm}}}\n'
+    scene = load(tmp_path, MESH + body + ball)
+    _, panel, lamp = scene.shapes
+    glow = np.ravel(lamp.emission)
+    assert glow @ [0.2126, 0.7152, 0.0722] == pytest.approx(2, rel=1e-3)
+    assert glow[0] / glow[2] == pytest.approx(6.4, rel=0.03)  # #ffb16e, of tables of 3000 K
+    camera = wf.Camera.look_at((0, 0, -5), (0, 0, 0), fov=2 * np.degrees(np.arctan(0.1)), size=(2, 2))
+    picture = wf.render(wf.Scene([panel], camera=camera), 64, filter="box", progress=False).rgb
+    pixels = picture.reshape(4, 3)  # upright where it is seen from its front
+    assert pixels[:3].argmax(1).tolist() == [0, 1, 2]
+    assert pixels[3].min() > 0.9 > pixels[:3].min(1).max()
 
 
 def test_what_is_hidden_is_left_out(tmp_path: Path) -> None:
@@ -345,7 +386,15 @@ def test_what_is_hidden_is_left_out(tmp_path: Path) -> None:
     [
         (f'def Cone "hat"\n{{\n}}\n{MESH}', "/hat a Cone; left out"),
         (PAINT % ("float inputs:displacement = 1", "") + BOUND, "/paint/shader displacement"),
-        (MESH + 'def SphereLight "l"\n{\n    bool treatAsPoint = 1\n}\n', "/l treatAsPoint"),
+        (MESH + 'def SphereLight "l"\n{\n    float inputs:shaping:cone:angle = 9\n}\n', "/l its radius"),
+        (
+            MESH + 'def DiskLight "l"\n{\n    float inputs:shaping:cone:angle = 9\n}\n',
+            "/l inputs:shaping:cone",
+        ),
+        (
+            MESH + 'def SphereLight "l"\n{\n    asset inputs:shaping:ies:file = @a.ies@\n}\n',
+            "/l inputs:shaping:ies:file",
+        ),
         (PAINT.replace("UsdPreviewSurface", "Other") % ("", "") + BOUND, "/paint its surface shader"),
         (MESH.replace('"none"', '"catmullClark"'), "/board subdivisionScheme"),
     ],

@@ -11,7 +11,7 @@ from typing import Any, TypeVar
 from numpy.typing import ArrayLike
 
 from ..codecs.budget import in_memory
-from ..core.errors import SceneError
+from ..core.errors import SceneError, number
 from ..core.files import path_name
 from ..core.progress import Progress, phase
 from ..materials import MaterialLike
@@ -36,6 +36,7 @@ def load(
     search_paths: PathLike | Sequence[PathLike] = (),
     smooth: bool | float | str = AUTO,
     parameters: Mapping[str, Any] | None = None,
+    time: float | None = None,
 ) -> Scene:
     """Read a scene: obj (with its mtl), ply, stl, glb, gltf, off, dae, 3mf, xml of Mitsuba 3, pbrt, or usd.
 
@@ -61,6 +62,8 @@ def load(
         `Mesh`, replace those of the file.
     parameters
         Values of the parameters `$name` of an .xml file, in place of their defaults.
+    time
+        Time code of a stage of USD; by default the first one.
 
     Raises
     ------
@@ -82,6 +85,7 @@ def load(
             search_paths=folders(search_paths),
             smooth=check_smooth("smooth", smooth),
             parameters=dict(parameters or {}),
+            time=None if time is None else number("time", time),
         )
         name, contents = path_name(path), read(path, options)
         placed = place_shapes(name, contents.raws, contents.places, strict)

@@ -34,6 +34,7 @@ class LoadOptions:
     search_paths: tuple[Path, ...] = ()  # folders whose files the file may refer to, beside its own
     smooth: bool | float | str = AUTO  # normals, as for `load`
     parameters: Mapping[str, Any] = field(default_factory=dict)  # of the scene file, by name
+    time: float | None = None  # the time code of a stage of USD; None for its first
 
 
 def read(path: PathLike, options: LoadOptions) -> Contents:
@@ -172,7 +173,7 @@ def _read_mitsuba(files: SceneFiles, data: bytes, options: LoadOptions) -> Conte
 def _read_usd(files: SceneFiles, data: bytes, options: LoadOptions) -> Contents:
     from .usd.stage import read_usd  # here, as programs that read no such scene need not pay for it
 
-    return read_usd(files, options.strict)
+    return read_usd(files, options.strict, options.time)
 
 
 PARTS = ("lights", "camera", "shapes", "settings", "medium")  # of a scene, that contents have, too

@@ -1,19 +1,23 @@
-"""A stage of USD as the contents of a file, at its first time."""
+"""A stage of USD as the contents of a file, at one time."""
 
 from __future__ import annotations
 
 import math
 import os
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from ...arrays.vec import luminance
 from ...camera import Camera
+from ...colors.spectrum import blackbody
 from ...core.errors import SceneError
-from ...lights import DirectionalLight, Environment, Light
+from ...lights import DirectionalLight, Environment, Light, PointLight, SpotLight
 from ...shapes import Disk, Rectangle, Shape, Sphere
 from ...shapes.transform import Matrix
+from ...textures import Texture
 from ..contents import Contents
 from ..placing import Places, moved_raw
 from ..repair import RawMesh, warn
@@ -23,13 +27,13 @@ from .materials import COLORED, Materials
 HEIGHT = 512  # pixels of the picture of a camera
 MOST_PRIMS = 2**20
 LIGHTS = ("SphereLight", "RectLight", "DiskLight", "DistantLight", "DomeLight")
-PLAIN = {"inputs:diffuse": 1.0, "inputs:specular": 1.0, "inputs:enableColorTemperature": False}
-PLAIN |= {"inputs:shaping:focus": 0.0, "treatAsPoint": False}
+PLAIN: dict[str, Any] = {"inputs:diffuse": 1.0, "inputs:specular": 1.0, "inputs:shaping:focus": 0.0}
+PLAIN |= {"inputs:shaping:ies:file": None}  # by their values where they change nothing
 HARMLESS = ("Scope", "Xform", "Material", "Shader", "NodeGraph", "GeomSubset", "RenderSettings", "")
 
 
-def read_usd(files: SceneFiles, strict: bool) -> Contents:
-    """Return the contents of a file of USD (.usd, .usda, .usdc, .usdz).
+def read_usd(files: SceneFiles, strict: bool, time: float | None = None) -> Contents:
+    """Return the contents of a file of USD (.usd, .usda, .usdc, .usdz) at a time code, by default the first.
 
     Raises
     ------
@@ -47,7 +51,7 @@ def read_usd(files: SceneFiles, strict: bool) -> Contents:
         for layer in stage.GetUsedLayers() if known else ():  # its files may have changed since
             layer.Reload(force=True)
         _check_layers(files, stage)
-        return _Reader(files, stage).contents(strict)
+        return _Reader(files, stage, time).contents(strict)
     except SceneError as error:
         raise error if str(error).startswith(name) else SceneError(f"{name}: {error}") from error
     except (RuntimeError, TypeError, ValueError, IndexError) as error:  # also those of pxr.Tf
@@ -64,10 +68,10 @@ def _check_layers(files: SceneFiles, stage: Any) -> None:
 
 
 class _Reader:
-    def __init__(self, files: SceneFiles, stage: Any) -> None:
+    def __init__(self, files: SceneFiles, stage: Any, time: float | None) -> None:
         from pxr import Usd, UsdGeom
 
-        start = stage.GetStartTimeCode() if stage.HasAuthoredTimeCodeRange() else None
+        start = stage.GetStartTimeCode() if time is None and stage.HasAuthoredTimeCodeRange() else time
         self.time = Usd.TimeCode.Default() if start is None else Usd.TimeCode(start)
         self.files, self.stage, self.cache = files, stage, UsdGeom.XformCache(self.time)
         self.lost: dict[tuple[str, str], None] = {}
@@ -258,10 +262,14 @@ class _Reader:
         for name, usual in PLAIN.items():
             if self._value(prim, name, usual) != usual:
                 self.lose(prim, name)
-        if kind not in ("DistantLight", "DomeLight") and of("shaping:cone:angle", 90.0) < 90:
+        cone, point = float(of("shaping:cone:angle", 90.0)), bool(self._value(prim, "treatAsPoint", False))
+        if kind in ("RectLight", "DiskLight") and cone < 90:
             self.lose(prim, "inputs:shaping:cone:angle")
         bright = np.asarray(of("color", (1, 1, 1)), float) * float(of("intensity", 1.0))
         bright = bright * 2.0 ** float(of("exposure", 0.0))
+        if of("enableColorTemperature", False):
+            white = blackbody(float(of("colorTemperature", 6500.0)))
+            bright = bright * (white / luminance(white))
         size = _scale(matrix) / self.unit
         x, y, z = (matrix[:3, i] / np.linalg.norm(matrix[:3, i]) for i in range(3))
         file = of("texture:file", None)
@@ -288,7 +296,15 @@ class _Reader:
             glow = bright / area if of("normalize", False) else bright
             center, name = matrix[:3, 3], str(prim.GetName())
             radius, width, height = radius * self.unit, width * self.unit, height * self.unit
-            if file is not None:
+            if kind == "SphereLight" and (point or cone < 90):
+                if not point:
+                    self.lose(prim, "its radius; a SpotLight in its place")
+                self.lights.append(_at_point(center, -z, glow * (math.pi * radius**2), cone, of))
+                return
+            if kind == "RectLight" and file is not None:
+                image = self.materials.pixels(prim, file)
+                glow = glow if image is None else Texture(image, wrap="clamp", scale=glow)
+            elif file is not None:
                 self.lose(prim, "inputs:texture:file")
             self.shapes.append(
                 Sphere(center, radius, emission=glow, name=name)
@@ -331,6 +347,14 @@ class _Reader:
             aperture=lens,
             focus=focus * self.unit if lens else None,
         )
+
+
+def _at_point(center: Any, axis: Any, intensity: Any, cone: float, of: Callable[[str, Any], Any]) -> Light:
+    """Return a light that stands at a point, and shines into a cone of `cone` degrees from its axis."""
+    if cone >= 90:
+        return PointLight(center, intensity)
+    softness = min(max(float(of("shaping:cone:softness", 0.0)), 0.0), 1.0)
+    return SpotLight(center, intensity, direction=axis, angle=2 * cone, blend=softness)
 
 
 def _scale(matrix: Matrix) -> float:
