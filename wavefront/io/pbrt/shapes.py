@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from ...arrays.elementary import arccos, sin_cos_turns
-from ...arrays.vec import Doubles, Ints
+from ...arrays.vec import Doubles, Ints, cross
 from ...core.errors import SceneError
 from ...shapes import Instance, Mesh, Shape, Sphere
 from ...shapes.transform import Matrix
@@ -168,9 +168,8 @@ def _arrays(entity: Entity, corners: int) -> RawMesh:
 
 def _checked(raw: RawMesh) -> RawMesh:
     """Return a mesh, if its faces use vertices that there are."""
-    bad = np.argwhere((raw.faces < 0) | (raw.faces >= len(raw.vertices)))
-    if len(bad):
-        i, j = bad[0]
+    if raw.faces.size and not (raw.faces.min() >= 0 and raw.faces.max() < len(raw.vertices)):
+        i, j = np.argwhere((raw.faces < 0) | (raw.faces >= len(raw.vertices)))[0]
         raise SceneError(
             f"face {i} uses vertex {raw.faces[i, j]}; it must be in [0, {len(raw.vertices) - 1}]"
         )
@@ -222,8 +221,7 @@ def _mesh(entity: Entity, job: Job, matrix: Matrix, light: Entity | None) -> Mes
         raise SceneError("is placed by a matrix whose elements are too large")
     with np.errstate(over="ignore", invalid="ignore"):
         raw = moved_raw(_facing(raw, entity.state.reverse), matrix)
-        a, b, c = (raw.vertices[raw.faces[:, i]] for i in range(3))
-        area = float(np.linalg.norm(np.cross(b - a, c - a), axis=1).sum()) / 2 if light else 0.0
+        area = _area(raw) if light else 0.0
     job.count(raw.faces)
     raw.material = material_of(entity.state, _opacity(entity, light, job), job, entity)
     raw.emission, raw.two_sided = _emission(light, area, job)
@@ -257,15 +255,20 @@ def _emission(light: Entity | None, area: float, job: Job) -> tuple[Any, bool]:
     return radiance, both
 
 
+def _area(raw: RawMesh) -> float:
+    """Return the area of a mesh."""
+    a, b, c = (raw.vertices[raw.faces[:, i]] for i in range(3))
+    return float(np.linalg.norm(np.cross(b - a, c - a), axis=1).sum()) / 2
+
+
 def _facing(raw: RawMesh, reverse: bool) -> RawMesh:
     """Return a mesh whose faces have their fronts where its normals are; `reverse` is ReverseOrientation."""
     faces, normals = raw.faces, raw.normals
     if normals is not None:
-        a, b, c = (raw.vertices[faces[:, i]] for i in range(3))
-        own = np.cross(b - a, c - a)
-        shading = normals[faces[:, 0]] + normals[faces[:, 1]] + normals[faces[:, 2]]
-        behind = (own * shading).sum(1) < 0
-        faces = np.where(behind[:, None], faces[:, ::-1], faces)
+        a, b, c = raw.vertices.T[:, faces.T].swapaxes(0, 1)
+        ahead = (cross(b - a, c - a) * normals.T[:, faces.T].sum(1)).sum(0) >= 0
+        if not ahead.all():
+            faces = np.where(ahead[:, None], faces, faces[:, ::-1])
     if reverse:
         faces, normals = faces[:, ::-1], None if normals is None else -normals
     return replace(raw, faces=faces, normals=normals)
