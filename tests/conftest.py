@@ -87,6 +87,17 @@ def no_estimates(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 @pytest.fixture
+def closed_figures() -> Iterator[None]:
+    """Draw without a window, and close all figures."""
+    import matplotlib
+    from matplotlib import pyplot
+
+    matplotlib.use("Agg")
+    yield
+    pyplot.close("all")
+
+
+@pytest.fixture
 def tables_restored() -> Iterator[None]:
     """Take what a test registers out of the tables again, so that no other test finds it there."""
     from wavefront.accel.registry import ACCELERATORS

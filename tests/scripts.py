@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import subprocess
 import sys
-from collections.abc import Iterator
+import time
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
 
@@ -67,6 +68,14 @@ def children(process: subprocess.Popen[str]) -> list[int]:
         with suppress(OSError):  # it has ended
             found += [int(pid) for pid in (thread / "children").read_text().split()]
     return found
+
+
+def eventually(condition: Callable[[], object], seconds: float = SOON) -> bool:
+    """Wait until a condition holds, at most so long."""
+    end = time.monotonic() + seconds
+    while not condition() and time.monotonic() < end:
+        time.sleep(0.005)
+    return bool(condition())
 
 
 def runs(pid: int) -> bool:

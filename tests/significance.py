@@ -116,3 +116,9 @@ def assert_same_images(a: Doubles, b: Doubles | float, max_error: float) -> None
         p = smallest_p(left, right)
         right_mean = np.mean(right)
         assert p > ALPHA, f"{name} means differ: p = {p:.1e}, overall {left.mean():.6g} and {right_mean:.6g}"
+
+
+def channels(scene: wf.Scene, spp: int, **options) -> list[Mean]:
+    """The means of the channels of a probe."""
+    image = render(scene, spp, **options).rgb.reshape(-1, 3).astype(np.float64)
+    return [Mean.of(each) for each in image.T]

@@ -1,6 +1,5 @@
 """Luminance of pictures, and false color with a scale in cd/m²."""
 
-import matplotlib
 import numpy as np
 import pytest
 from matplotlib import pyplot
@@ -11,11 +10,7 @@ RGB = np.float32([[[1, 1, 1], [0, 2, 0]], [[0, 0, 0], [0.5, 0, 10]]])
 LUMINANCE = 683 * np.array([[1, 2 * 0.7152], [0, 0.5 * 0.2126 + 10 * 0.0722]])
 
 
-@pytest.fixture(autouse=True)
-def closed():
-    matplotlib.use("Agg")
-    yield
-    pyplot.close("all")
+pytestmark = pytest.mark.usefixtures("closed_figures")
 
 
 def test_luminance() -> None:

@@ -3,7 +3,6 @@
 import subprocess
 import sys
 
-import matplotlib
 import numpy as np
 import pytest
 from matplotlib import pyplot
@@ -12,13 +11,7 @@ from pictures import with_everything
 import wavefront as wf
 from wavefront.image.plot import id_colors
 
-
-@pytest.fixture(autouse=True)
-def closed():
-    """Draw without a window, and close all figures."""
-    matplotlib.use("Agg")
-    yield
-    pyplot.close("all")
+pytestmark = pytest.mark.usefixtures("closed_figures")
 
 
 def drawn(axes):

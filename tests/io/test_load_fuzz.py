@@ -1,7 +1,7 @@
 """Damaged files of every kind: a typed error or a scene, never anything else, within memory and time.
 
-Half of the damage is to bytes, the other half to the structure of the format (mutations.py). It is done in a
-process of its own with 3 GB of memory and 25 s for each file; `python tests/io/test_load_fuzz.py SEED COUNT`
+Half of the damage is to bytes, the other half to the structure of the format (file_damage.py). It is done in
+a process of its own with 3 GB of memory and 25 s for each file; `python tests/io/test_load_fuzz.py SEED N`
 repeats a run, and leaves a file that fails as `fuzz-SEED-NUMBER-NAME` in the current folder if KEEP is set.
 """
 
@@ -20,8 +20,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 import trimesh
+from file_damage import mutate
 from gltf_builder import Builder
-from mutations import mutate
 
 from wavefront.codecs.display import Display
 from wavefront.codecs.image_data import ImageData

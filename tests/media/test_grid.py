@@ -5,7 +5,7 @@ import pytest
 from scenes import probe
 from scipy import stats
 from scipy.ndimage import map_coordinates
-from significance import ALPHA, Mean, assert_mean, assert_same_images, render, repeat
+from significance import ALPHA, assert_mean, assert_same_images, channels, render, repeat
 
 import wavefront as wf
 from wavefront.colors.spectrum import blackbody_colors
@@ -15,12 +15,6 @@ from wavefront.sampling.steps import StepNumbers
 
 BOX = ((-1, -1, -1), (1, 1, 1))
 FAR = wf.Sphere((0, 0, -1e4), 1, material=wf.Diffuse(0.0))
-
-
-def channels(scene: wf.Scene, spp: int, **options) -> list[Mean]:
-    """The means of the channels of a probe."""
-    image = render(scene, spp, **options).rgb.reshape(-1, 3).astype(np.float64)
-    return [Mean.of(each) for each in image.T]
 
 
 def noise(shape=(7, 6, 5), seed: int = 1) -> np.ndarray:

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 import significance
 from scenes import probe
-from significance import Mean, assert_mean, assert_same_images, measure, render, repeat
+from significance import assert_mean, assert_same_images, channels, measure, render, repeat
 
 import wavefront as wf
 from wavefront.arrays.state import SurfaceInteraction
@@ -27,12 +27,6 @@ def ball(medium, radius=1.0, at=(0, 0, 0), bsdf=None, **more) -> wf.Sphere:
 def block(medium, low=(-1, -1, -1), high=(1, 1, 1), bsdf=None, **more) -> wf.Mesh:
     low, high = np.array(low, float), np.array(high, float)
     return wf.Box((low + high) / 2, high - low, material=around(medium, bsdf, **more))
-
-
-def channels(scene: wf.Scene, spp: int, **options) -> list[Mean]:
-    """The means of the channels of a probe."""
-    image = render(scene, spp, **options).rgb.reshape(-1, 3).astype(np.float64)
-    return [Mean.of(each) for each in image.T]
 
 
 # --- Beer and Lambert ------------------------------------------------------------------------------------

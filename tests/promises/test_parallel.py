@@ -17,6 +17,7 @@ from typing import Any
 import numpy as np
 import pytest
 import scenes
+from scripts import eventually, runs
 from threadpoolctl import threadpool_limits
 
 import wavefront as wf
@@ -145,22 +146,7 @@ def test_workers_end_with_their_parent(tmp_path: Path) -> None:
     parent.kill()
     parent.wait()
     parent.stdout.close()
-    assert eventually(lambda: not any(map(_runs, pids)))
-
-
-def eventually(condition: Callable[[], bool]) -> bool:
-    """Wait until a condition holds."""
-    end = time.monotonic() + HANGS
-    while not (holds := condition()) and time.monotonic() < end:
-        time.sleep(0.01)
-    return holds
-
-
-def _runs(pid: int) -> bool:
-    try:
-        return Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()[0] != "Z"
-    except OSError:
-        return False
+    assert eventually(lambda: not any(map(runs, pids)))
 
 
 def test_default_is_one_worker_per_core() -> None:

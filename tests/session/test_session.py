@@ -8,12 +8,11 @@ import signal
 import sys
 import threading
 import time
-from collections.abc import Callable
 
 import numpy as np
 import pytest
 import scenes
-from scripts import children, end_of, runs, script, wait_for
+from scripts import children, end_of, eventually, runs, script, wait_for
 
 import wavefront as wf
 from wavefront.core.shared import SharedInt
@@ -36,14 +35,6 @@ def same(a: wf.Image, b: wf.Image) -> bool:
     """Return True if all parts of two pictures have the same bits."""
     parts = ("rgb", "counts", "variance", "standard_error")
     return all(getattr(a, part).tobytes() == getattr(b, part).tobytes() for part in parts)
-
-
-def eventually(condition: Callable[[], bool], seconds: float = 30) -> bool:
-    """Wait until a condition holds, at most so long."""
-    end = time.monotonic() + seconds
-    while not condition() and time.monotonic() < end:
-        time.sleep(0.02)
-    return condition()
 
 
 # --- The picture while it grows -------------------------------------------------------------------

@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 import trimesh
+from rays import nothing, same_bits
 from significance import render
 from trimesh.transformations import euler_matrix, translation_matrix
 
@@ -99,14 +100,6 @@ def rays(n: int, reach: float, seed: int = 0) -> tuple[np.ndarray, np.ndarray]:
     direction[:, : n // 8] *= np.eye(3)[rng.integers(0, 3, n // 8)].T  # along an axis
     direction[0, direction.max(0) == direction.min(0)] = 1
     return origin.astype(f4), (direction / np.linalg.norm(direction, axis=0)).astype(f4)
-
-
-def nothing(n: int) -> np.ndarray:
-    return np.full(n, -1)
-
-
-def same_bits(a: Intersections, b: Intersections) -> bool:
-    return all(getattr(a, k).tobytes() == getattr(b, k).tobytes() for k in ("t", "prim", "b1", "b2"))
 
 
 def piece(hits: Intersections, part) -> Intersections:

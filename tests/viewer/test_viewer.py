@@ -15,7 +15,7 @@ import threading
 import time
 import urllib.error
 import urllib.request
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from contextlib import suppress
 from itertools import pairwise
 from pathlib import Path
@@ -26,6 +26,7 @@ from urllib.parse import urlsplit
 import imageio.v3 as iio
 import numpy as np
 import pytest
+from scripts import SOON, eventually
 
 import wavefront as wf
 from wavefront.cli import main, view_commands
@@ -48,7 +49,6 @@ datastructures = pytest.importorskip("websockets.datastructures")
 
 BALL = wf.Scene([wf.Sphere((0, 0, 0), 1, material=wf.Diffuse((0.7, 0.3, 0.1)))], wf.Environment(1))
 CAMERA = wf.Camera.look_at((0, 0, 5), (0, 0, 0), size=(64, 48))
-SOON = 30.0  # seconds; far less is usual
 
 
 # --- The loop -------------------------------------------------------------------------------------
@@ -115,14 +115,6 @@ class Watched:
         self.refiner = Refiner(cast(wf.Session, session), self.frames.append, self.errors.append)
         self.refiner.start()
         self.refiner.refine()
-
-
-def eventually(condition: Callable[[], object], seconds: float = SOON) -> bool:
-    """Wait until a condition holds, at most so long."""
-    end = time.monotonic() + seconds
-    while not condition() and time.monotonic() < end:
-        time.sleep(0.005)
-    return bool(condition())
 
 
 def entered(session: Scripted) -> None:

@@ -7,7 +7,7 @@ import multiprocessing
 import shutil
 import threading
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from functools import partial
 from http.server import SimpleHTTPRequestHandler, ThreadingHTTPServer
 from pathlib import Path
@@ -16,6 +16,7 @@ from typing import Any
 import imageio.v3 as iio
 import numpy as np
 import pytest
+from scripts import eventually
 
 import wavefront as wf
 
@@ -43,14 +44,6 @@ CAMERA = wf.Camera.look_at((1, 2, 7), (1, 0, 0), size=(320, 240))
 SPP = 16
 
 
-def eventually(condition: Callable[[], object], seconds: float = SOON) -> bool:
-    """Wait until a condition holds, at most so long."""
-    end = time.monotonic() + seconds
-    while not condition() and time.monotonic() < end:
-        time.sleep(0.02)
-    return bool(condition())
-
-
 @pytest.fixture
 def browser() -> Iterator[Any]:
     with playwright.sync_playwright() as driver:
@@ -64,7 +57,7 @@ def viewer() -> Iterator[wf.Viewer]:
     before = set(threading.enumerate())
     with wf.view(SCENE, SPP, camera=CAMERA, port=0, open_browser=False, block=False) as viewer:
         yield viewer
-    assert eventually(lambda: set(threading.enumerate()) <= before)
+    assert eventually(lambda: set(threading.enumerate()) <= before, SOON)
     assert multiprocessing.active_children() == []
 
 
@@ -142,7 +135,7 @@ def test_a_black_picture_replaces_the_first_one_when_somebody_acts(browser: Any)
         camera = viewer.camera
         drag(page, 60, 0)
         assert page.evaluate(is_drawn)
-        assert eventually(lambda: viewer.camera is not camera)
+        assert eventually(lambda: viewer.camera is not camera, SOON)
 
 
 def test_a_drag_changes_the_view_and_the_picture_restarts(page: Any, viewer: wf.Viewer) -> None:
@@ -151,7 +144,7 @@ def test_a_drag_changes_the_view_and_the_picture_restarts(page: Any, viewer: wf.
     show = viewer._page.show  # type: ignore[union-attr]
     viewer._page.show = lambda frame: (spp.append(frame.image.spp), show(frame))  # type: ignore[union-attr, method-assign, assignment]
     drag(page, 150, 40)
-    assert eventually(lambda: not np.allclose(viewer.camera.origin, camera.origin))
+    assert eventually(lambda: not np.allclose(viewer.camera.origin, camera.origin), SOON)
     assert np.linalg.norm(viewer.camera.origin - (1, 0, 0)) == pytest.approx(
         np.sqrt(53), rel=0.05
     )  # an orbit
@@ -174,7 +167,7 @@ def test_the_wheel_zooms_and_the_right_button_pans(page: Any, viewer: wf.Viewer)
     page.mouse.down(button="right")
     page.mouse.move(400, 450, steps=5)
     page.mouse.up(button="right")
-    assert eventually(lambda: np.abs(viewer.camera.origin - camera.origin).max() > 0.1)
+    assert eventually(lambda: np.abs(viewer.camera.origin - camera.origin).max() > 0.1, SOON)
     page.wait_for_timeout(1000)
     assert np.abs(viewer.camera.rotation - camera.rotation).max() < 1e-3
 
@@ -187,12 +180,12 @@ def test_controls_change_the_lens_and_what_is_shown(page: Any, viewer: wf.Viewer
     assert dark.mean() < 0.8 * bright.mean()
     page.get_by_role("combobox").nth(-2).click()  # above that of the tone
     page.get_by_role("option", name="normal").click()
-    assert eventually(lambda: np.abs(shot(page) - dark).mean() > 10)
+    assert eventually(lambda: np.abs(shot(page) - dark).mean() > 10, SOON)
     assert viewer.image is picture
     enter(page, FIELD_OF_VIEW, "20")
-    assert eventually(lambda: viewer.camera.projection.fov == 20)  # type: ignore[attr-defined]
+    assert eventually(lambda: viewer.camera.projection.fov == 20, SOON)  # type: ignore[attr-defined]
     enter(page, APERTURE, "0.5")
-    assert eventually(lambda: viewer.camera.projection.aperture == 0.5)  # type: ignore[attr-defined]
+    assert eventually(lambda: viewer.camera.projection.aperture == 0.5, SOON)  # type: ignore[attr-defined]
     assert viewer.wait_for_picture(SOON).rgb.tobytes() == expected(viewer).rgb.tobytes()
 
 
@@ -330,7 +323,7 @@ def test_the_panel_of_a_phone_is_folded(viewer: wf.Viewer, browser: Any) -> None
     page.goto(viewer.url)
     page.get_by_text("spp").wait_for(state="hidden", timeout=1000 * SOON)
     page.get_by_text("spp").wait_for(state="attached", timeout=1000 * SOON)
-    assert eventually(lambda: page.get_by_text("wavefront").last.bounding_box()["y"] > 700)
+    assert eventually(lambda: page.get_by_text("wavefront").last.bounding_box()["y"] > 700, SOON)
     page.get_by_text("wavefront").last.tap()
     page.get_by_text("spp").wait_for(timeout=1000 * SOON)
 
