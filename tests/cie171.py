@@ -192,7 +192,7 @@ def glass(kind: str) -> Callable[[int], Found]:
         along = np.stack([np.sin(angle), 0 * angle, np.cos(angle)], 1)
         found = measured(wf.Scene([pane], [sky]), -0.1 * along, along, spp, kind="radiance", max_bounces=64)
         absorption = 0 if kind == "thin" else ABSORPTION
-        return Found(*found, 100 * transmittance(np.cos(angle), absorption, polarized=kind == "own"))
+        return Found(*found, 100 * transmittance(np.cos(angle), absorption, polarized=kind != "slab"))
 
     return run
 

@@ -70,11 +70,22 @@ def midpoints(count, low=0.0, high=1.0):
 
 def fresnel(cos, eta):
     """Unpolarized reflectance by Snell's law and Fresnel's equations."""
+    return sum(polarizations(cos, eta)) / 2
+
+
+def polarizations(cos, eta):
+    """Reflectance of both polarizations."""
     sin = np.sqrt(1 - cos**2) / eta
     cos_t = np.sqrt(np.maximum(1 - sin**2, 0))
     s = (cos - eta * cos_t) / (cos + eta * cos_t)
     p = (eta * cos - cos_t) / (eta * cos + cos_t)
-    return np.where(sin < 1, (s**2 + p**2) / 2, 1.0)
+    return tuple(np.where(sin < 1, each**2, 1.0) for each in (s, p))
+
+
+def sheet_series(cos, eta):
+    """Reflectance of a sheet: both faces, and all between, for each polarization by itself."""
+    faces = polarizations(cos, eta)
+    return sum(face + (1 - face) ** 2 * face / (1 - face**2) for face in faces) / 2
 
 
 def schlick(f0, cos, f90=1.0):
@@ -384,8 +395,7 @@ def test_rough_sheet(roughness):
     sheet = ThinDielectric(1.5, roughness, reflectance=COLOR, transmittance=COLOR[::-1], multiscatter=False)
     wo, wi = pairs()
     value, cos = reflection(wo, wi, roughness**2)
-    face = fresnel(cos, 1.5)
-    series = face + (1 - face) ** 2 * face / (1 - face**2)  # both faces, and all between
+    series = sheet_series(cos, 1.5)
     assert sheet.f(wo, wi) == pytest.approx(column(COLOR) * (value * series), rel=1e-3, abs=1e-6)
     through = column(COLOR[::-1]) * (value * (1 - series))
     wi[2] *= -1
@@ -395,8 +405,7 @@ def test_rough_sheet(roughness):
 def test_smooth_sheet():
     sheet = ThinDielectric(1.5, reflectance=COLOR, transmittance=COLOR[::-1])
     wo, _ = pairs()
-    face = fresnel(wo[2].astype(float), 1.5)
-    series = face + (1 - face) ** 2 * face / (1 - face**2)
+    series = sheet_series(wo[2].astype(float), 1.5)
     up = sheet.sample_f(wo, np.zeros((3, wo.shape[1]), F4))
     down = sheet.sample_f(wo, np.full((3, wo.shape[1]), np.nextafter(F4(1), F4(0))))
     mirrored = wo * np.array([[-1], [-1], [1]], F4)

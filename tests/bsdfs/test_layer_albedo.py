@@ -11,12 +11,17 @@ COSINES = np.array([1.0, 0.8, 0.5, 0.2])
 WO = np.stack([np.sqrt(1 - COSINES**2), 0 * COSINES, COSINES]).astype(f4)
 
 
-def fresnel(ior: float) -> np.ndarray:
-    """Unpolarized reflectance by Snell and Fresnel (E. Hecht, Optics, eqs. 4.34 and 4.40)."""
+def polarizations(ior: float) -> np.ndarray:
+    """Reflectance (2, n) of each polarization, by Snell and Fresnel (E. Hecht, Optics, 4.34 and 4.40)."""
     inside = np.sqrt(1 - (1 - COSINES**2) / ior**2)
     s = (COSINES - ior * inside) / (COSINES + ior * inside)
     p = (ior * COSINES - inside) / (ior * COSINES + inside)
-    return (s**2 + p**2) / 2
+    return np.stack([s**2, p**2])
+
+
+def fresnel(ior: float) -> np.ndarray:
+    """Unpolarized reflectance of a face."""
+    return polarizations(ior).mean(0)
 
 
 REFLECTED, THROUGH = np.array([[0.9], [0.3], [0.1]]), np.array([[0.2], [0.6], [1.0]])
@@ -29,7 +34,8 @@ def test_glass_reflects_and_lets_through_its_tints(ior: float, roughness: float)
     tints = {"reflectance": REFLECTED[:, 0], "transmittance": THROUGH[:, 0]}
     due = REFLECTED * part + THROUGH * (1 - part)
     np.testing.assert_allclose(albedo_of(wf.Dielectric(ior, roughness, **tints), WO), due, rtol=1e-5)
-    sheet = 2 * part / (1 + part)  # of both faces
+    faces = polarizations(ior)
+    sheet = (2 * faces / (1 + faces)).mean(0)  # of both faces
     due = REFLECTED * sheet + THROUGH * (1 - sheet)
     np.testing.assert_allclose(albedo_of(wf.ThinDielectric(ior, roughness, **tints), WO), due, rtol=1e-5)
 

@@ -386,7 +386,9 @@ def test_a_plot_has_isolines_over_the_plane_of_the_points() -> None:
     found = wf.measure(scenes.panel((-0.3, -0.3), (0.3, 0.3), 0.9), points, normals, spp=4, **QUIET)
     axes = found.plot()
     assert (axes.get_xlabel(), axes.get_ylabel()) == ("x", "y")
+    assert axes.figure.axes[1].get_ylabel() == "irradiance, W·m⁻²"
     assert found.plot(axes=axes) is axes
+    assert found.plot(label="daylight factor, %").figure.axes[1].get_ylabel() == "daylight factor, %"
     pyplot.close("all")
     line = wf.measure(SKY, [(0, 0, 0), (1, 1, 1), (2, 2, 2)], (0, 0, 1), spp=1, **QUIET)
     with pytest.raises(wf.SceneError, match="plot: the points are on one line"):

@@ -30,12 +30,36 @@ def fresnel_dielectric(cos: Floats, eta: Floats) -> tuple[Floats, Floats]:
     "Microfacet Models for Refraction through Rough Surfaces", eq. 22. Written with
     g² = cos² + (η² − 1), which is exact at η = 1 and needs no branch for total internal reflection.
     """
+    perpendicular, parallel, g = _amplitudes(cos, eta)
+    reflectance = f4(0.5) * (perpendicular * perpendicular + parallel * parallel)
+    return np.where(g > 0, reflectance, f4(1)), np.minimum(g / eta, f4(1))
+
+
+def _amplitudes(cos: Floats, eta: Floats) -> tuple[Floats, Floats, Floats]:
+    """Return the amplitudes of both polarizations, and g of `fresnel_dielectric`, (n,) each."""
     eta_scale = eta * eta
     g = np.sqrt(np.maximum(cos * cos + (eta - f4(1)) * (eta + f4(1)), f4(0)))
     perpendicular = (cos - g) / np.maximum(cos + g, TINY)
     parallel = (eta_scale * cos - g) / np.maximum(eta_scale * cos + g, TINY)
-    reflectance = f4(0.5) * (perpendicular * perpendicular + parallel * parallel)
-    return np.where(g > 0, reflectance, f4(1)), np.minimum(g / eta, f4(1))
+    return perpendicular, parallel, g
+
+
+def fresnel_sheet(cos: Floats, eta: Floats) -> Floats:
+    """Unpolarized reflectance (n,) of a clear sheet with two parallel faces, without interference.
+
+    Parameters
+    ----------
+    cos, eta
+        As for `fresnel_dielectric`, of the first face.
+
+    Notes
+    -----
+    Light that a face polarizes stays polarized at the next one. So each polarization has its own sum of all
+    reflections, 2R/(1 + R) with R of one face (Hecht, *Optics*, §9.6), and the reflectance is their mean.
+    """
+    perpendicular, parallel, g = _amplitudes(cos, eta)
+    s, p = perpendicular * perpendicular, parallel * parallel
+    return np.where(g > 0, s / (f4(1) + s) + p / (f4(1) + p), f4(1))
 
 
 def fresnel_conductor(cos: Floats, eta: Floats, k: Floats) -> Floats:

@@ -7,7 +7,7 @@ import numpy as np
 from ..arrays.vec import Floats, dot, f4
 from .base import BsdfSample, weigh
 from .energy import gain
-from .fresnel import fresnel_dielectric
+from .fresnel import fresnel_sheet
 from .microfacet import reflect
 from .mirror import mirrored
 from .refractive import RefractiveBsdf
@@ -16,9 +16,10 @@ from .refractive import RefractiveBsdf
 class ThinDielectric(RefractiveBsdf):
     """A thin sheet of clear material, such as a window pane: it reflects and transmits without refraction.
 
-    All reflections between its two faces are summed: with R of one face it reflects 2R/(1 + R) (Hecht,
-    *Optics*, §9.6, without interference). It looks the same from both sides. A rough sheet scatters
-    transmitted light as widely as reflected light, as in glTF's KHR_materials_transmission.
+    All reflections between its two faces are summed, for each polarization by itself: with R of one face it
+    reflects 2R/(1 + R) (Hecht, *Optics*, §9.6, without interference). It looks the same from both sides. A
+    rough sheet scatters transmitted light as widely as reflected light, as in glTF's
+    KHR_materials_transmission.
 
     Parameters
     ----------
@@ -82,5 +83,4 @@ class ThinDielectric(RefractiveBsdf):
 
     def _reflected(self, cos: Floats) -> Floats:
         """Part of the light that the sheet reflects, (n,)."""
-        face, _ = fresnel_dielectric(cos, self.ior)
-        return f4(2) * face / (f4(1) + face)
+        return fresnel_sheet(cos, self.ior)

@@ -209,7 +209,7 @@ class Measurement:
         except SceneError as error:
             raise SceneError(f"{os.fspath(path)}: {error}") from None
 
-    def plot(self, levels: int = 8, axes: Any = None) -> Any:
+    def plot(self, levels: int = 8, axes: Any = None, label: str | None = None) -> Any:
         """Plot the luminance of the values with matplotlib: false color and isolines over a plane of points.
 
         Parameters
@@ -218,6 +218,8 @@ class Measurement:
             Number of isolines, about.
         axes
             Axes of matplotlib to draw into; by default those of a new figure.
+        label
+            What the scale of colors says; by default what is measured, and its unit.
 
         Returns
         -------
@@ -233,7 +235,7 @@ class Measurement:
         """
         from .plot import draw
 
-        return draw(self, levels, axes)
+        return draw(self, levels, axes, label)
 
 
 def file_kind(path: str | os.PathLike[str]) -> str:

@@ -22,7 +22,7 @@ UNITS = {
 }
 
 
-def draw(found: Measurement, levels: int, axes: Any) -> Any:
+def draw(found: Measurement, levels: int, axes: Any, label: str | None) -> Any:
     """Draw a measurement over the two axes along which its points are spread most, and return the axes."""
     pyplot = import_pyplot()
     across, up = np.sort(np.argsort(-np.ptp(found.points, axis=0), kind="stable")[:2])
@@ -34,7 +34,7 @@ def draw(found: Measurement, levels: int, axes: Any) -> Any:
     filled = axes.tricontourf(x, y, value, 64, cmap="viridis")
     if np.ptp(value) > 0:
         axes.clabel(axes.tricontour(x, y, value, levels, colors="white", linewidths=0.7), fontsize="small")
-    axes.figure.colorbar(filled, ax=axes, label=f"{found.kind}, {UNITS[found.kind]}")
+    axes.figure.colorbar(filled, ax=axes, label=label or f"{found.kind}, {UNITS[found.kind]}")
     axes.set_aspect("equal")
     axes.set_xlabel("xyz"[across])
     axes.set_ylabel("xyz"[up])
