@@ -30,7 +30,6 @@ from wavefront.scheduling.pool import WorkerPool
 LINUX = sys.platform.startswith("linux")
 EXECUTORS = ["threads", pytest.param("processes", marks=pytest.mark.skipif(not LINUX, reason="needs fork"))]
 processes = pytest.mark.skipif(not LINUX, reason="needs fork")
-HANGS = 60.0  # seconds; nothing here takes as long unless it waits for what does not come
 
 
 def run(work: Callable[[int], int], jobs: range, workers: int, executor: str) -> list[tuple[int, int]]:
