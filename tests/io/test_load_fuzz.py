@@ -7,6 +7,7 @@ repeats a run, and leaves a file that fails as `fuzz-SEED-NUMBER-NAME` in the cu
 
 import os
 import random
+import re
 import struct
 import subprocess
 import sys
@@ -203,6 +204,38 @@ def test_damaged_files(seed, count):
     print(f"{count} inputs tried")
     print(done.stdout.partition(f"\n{count - 1} ")[2])
     assert f"{count - 1} " in done.stdout
+
+
+def mutated(parts, rng):
+    """Return a text of which words are exchanged, left out or put in, or lose a letter."""
+    parts = list(parts)
+    for _ in range(rng.choice((1, 1, 1, 2))):
+        at = rng.randrange(len(parts))
+        word, other = parts[at], parts[rng.randrange(len(parts))]
+        cut = rng.randrange(len(word) + 1)
+        odd = rng.choice(WORDS[:16]).decode("latin-1")
+        letters = word[:cut] + chr(rng.randrange(32, 127)) + word[cut + rng.randrange(3) :]
+        parts[at] = rng.choice((other, odd, "", word + other, letters, letters))
+    return "".join(parts)
+
+
+@pytest.mark.parametrize("name", ["s.xml", "s.pbrt"])
+@pytest.mark.parametrize("count", [100, pytest.param(3000, marks=pytest.mark.slow)])
+@pytest.mark.filterwarnings("ignore::UserWarning")
+def test_mutated_scenes_are_read_or_refused_with_file_and_line(tmp_path, name, count):
+    make_seeds(tmp_path)
+    path, rng = tmp_path / name, random.Random(count)
+    parts = re.split(r"(\s+)", path.read_text())
+    messages = []
+    for _ in range(count):
+        path.write_text(mutated(parts, rng))
+        try:
+            assert load(path, progress=False).shapes
+        except SceneError as error:
+            messages.append(str(error))
+    assert count / 3 < len(messages) < count * 0.9
+    whole = "the scene has no shapes|has no faces"  # of no line
+    assert [each for each in messages if not re.match(f"{tmp_path}/[^ ]+ ?.*(line \\d+|{whole})", each)] == []
 
 
 if __name__ == "__main__":
