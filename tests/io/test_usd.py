@@ -357,6 +357,17 @@ def test_lights_at_points(tmp_path: Path) -> None:
     assert (spot.angle, spot.blend) == (60, 0.25)
 
 
+def test_errors_name_file_and_prim(tmp_path: Path) -> None:
+    warm = "    bool inputs:enableColorTemperature = 1\n    float inputs:colorTemperature = 3\n"
+    for body, message in (
+        (f'def SphereLight "l"\n{{\n{warm}}}\n', "/l: temperature is 3.0; it must be from 100 to 1e6 kelvin"),
+        ('def SphereLight "l"\n{\n    float inputs:intensity = nan\n}\n', "/l: "),
+        ('def Sphere "s"\n{\n    double radius = -1\n}\n', "/s: "),
+    ):
+        with pytest.raises(wf.SceneError, match=f"^{tmp_path}/scene.usda: {message}"):
+            load(tmp_path, MESH + body)
+
+
 def test_panels_show_textures_and_lights_have_a_temperature(tmp_path: Path) -> None:
     write_image(tmp_path / "a.exr", np.array([[[1, 0, 0], [0, 1, 0]], [[0, 0, 1], [1, 1, 1]]], np.float32))
     warm = "    bool inputs:enableColorTemperature = 1\n    float inputs:colorTemperature = 3000\n"
@@ -397,6 +408,10 @@ def test_what_is_hidden_is_left_out(tmp_path: Path) -> None:
         ),
         (PAINT.replace("UsdPreviewSurface", "Other") % ("", "") + BOUND, "/paint its surface shader"),
         (MESH.replace('"none"', '"catmullClark"'), "/board subdivisionScheme"),
+        (
+            MESH + 'def DomeLight "d"\n{\n    token inputs:texture:format = "angular"\n}\n',
+            "/d inputs:texture",
+        ),
     ],
 )
 def test_what_is_not_honored_is_one_warning(tmp_path: Path, body: str, message: str) -> None:

@@ -19,6 +19,7 @@ from ...shapes import Disk, Rectangle, Shape, Sphere
 from ...shapes.transform import Matrix
 from ...textures import Texture
 from ..contents import Contents
+from ..conversion import placed
 from ..placing import Places, moved_raw
 from ..repair import RawMesh, warn
 from ..sources import SceneFiles
@@ -123,7 +124,8 @@ class _Reader:
             if kind == "PointInstancer":
                 self._instancer(prim, below)
                 continue
-            with np.errstate(all="ignore"):  # what is not finite is refused
+            where = str(prim.GetPath())
+            with np.errstate(all="ignore"), placed(where, where):  # what is not finite is refused
                 self._read(prim, kind, below)
             children = prim.GetFilteredChildren(Usd.TraverseInstanceProxies())
             waiting += [(child, below) for child in reversed(children)]
@@ -280,6 +282,8 @@ class _Reader:
             self.lights.append(DirectionalLight(-z, bright * factor, angle=angle))
         elif kind == "DomeLight":
             axes = np.stack([x, y, z], 1)
+            if of("texture:format", "automatic") not in ("automatic", "latlong"):
+                self.lose(prim, "inputs:texture:format; 'latlong' in its place")
             if file is None:
                 self.lights.append(Environment(bright))
             else:
