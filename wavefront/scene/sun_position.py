@@ -61,7 +61,7 @@ def sun_position(
 
     Examples
     --------
-    >>> wf.sun_position("2026-06-21 12:00", latitude=48.1, longitude=11.6).round(2)  # doctest: +SKIP
+    >>> wf.sun_position("2026-06-21 12:00", latitude=48.1, longitude=11.6).round(2)
     array([-0.18,  0.9 ,  0.4 ])
     """
     place = (
