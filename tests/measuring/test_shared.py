@@ -62,8 +62,8 @@ def test_tiles_of_one_place_and_of_few_points() -> None:
 @pytest.mark.parametrize(("kind", "factor"), [("irradiance", np.pi), ("fluence", 4 * np.pi), ("radiance", 1)])
 def test_a_furnace_is_as_bright_with_shared_paths(kind: str, factor: float) -> None:
     wall = wf.Sphere((0, 0, 0), 3, material=wf.Material(wf.Diffuse(0.6), emission=1))
-    found = Mean.of(of_tiles(wall, kind, spp=4, max_bounces=40, reuse=True))
-    assert_mean(found, factor / 0.4, 0.01)
+    found = Mean.of(of_tiles(wall, kind, spp=32, max_bounces=40, reuse=True))
+    assert_mean(found, factor / 0.4, 0.002)
 
 
 @pytest.mark.parametrize(
