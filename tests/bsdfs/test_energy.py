@@ -9,6 +9,7 @@ import wavefront as wf
 from wavefront.bsdfs import Bsdf, Conductor, Dielectric, Plastic, Principled, ThinDielectric
 from wavefront.bsdfs.energy import Shape, loss, mean_over_cosines, part_kept, scaling
 from wavefront.bsdfs.rough import RoughBsdf
+from wavefront.textures.parameter import scalar
 
 F4 = np.float32
 SAMPLES = 10_000
@@ -159,8 +160,8 @@ def test_tables_have_their_shape_by_the_roughness(across: float | None) -> None:
         """A surface of microfacets without a model."""
 
         def __init__(self, roughness):
-            self._set_facets(roughness, across, 0.0, "beckmann", "separable", True)
-            self.derive()
+            self.roughness = scalar("roughness", roughness)
+            super().__init__(roughness_v=across, distribution="beckmann", shadowing="separable")
 
         def evaluate(self, wo, wi):
             raise NotImplementedError
