@@ -192,7 +192,8 @@ def test_the_lobe_of_glass_returns_what_is_lost(ior: float, across: float | None
         for side in (False, True):
             inside, eta = np.full(k.size, side), 1 / ior if side else ior
             wi = table.directions(glass, u.astype(F4), inside, k)
-            value, density, chance = table.lobe(glass, wo, wi, inside)
+            stretched = glass.facets().stretched(wo), glass.facets().stretched(wi)
+            value, density, chance = table.lobe(glass, wo, wi, inside, stretched)
             energy = value * np.abs(wi[2]) * np.where(wi[2] < 0, eta**2, 1) / density
             assert energy.mean(dtype=float) == pytest.approx(chance[0], rel=5e-3)
 

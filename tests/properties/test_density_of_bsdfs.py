@@ -260,7 +260,10 @@ def density_by_differentiation(bsdf, wo, wi, inside):
         lanes = np.flatnonzero(same)
         if not lanes.size:
             if bsdf.transmissive and getattr(bsdf, "multiscatter", False):  # the lobe may be too rare
-                wide = max(facets.wide_pdf(wi)[0] for facets in facets_of(bound_to(bsdf, wo, inside)))
+                wide = max(
+                    facets.wide_pdf(wi, facets.stretched(wi))[0]
+                    for facets in facets_of(bound_to(bsdf, wo, inside))
+                )
                 bound += 2 * wide / CHOICES
             continue
         choice = third[lanes[lanes.size // 2]]

@@ -165,19 +165,25 @@ class Dielectric(RefractiveBsdf):
     def _evaluate_rough(self, wo: Floats, wi: Floats, chance: Floats | None = None) -> tuple[Floats, Floats]:
         """Evaluate, with the probability (n,) of the lobe of multiple scattering, if it is known."""
         facets = self.facets()
-        value, density, cos = facets.mirror_lobe(wo, wi)
+        both = facets.stretched(wo), facets.stretched(wi)
+        value, density, cos = facets.mirror_lobe(wo, wi, both)
         if self.again:
-            value = value * gain(self, wo, wi)
-        through, through_density, through_cos, valid = facets.refraction_lobe(wo, wi, self.eta)
+            value = value * gain(self, wo, wi, None, both)
+        through, through_density, through_cos, valid = facets.refraction_lobe(wo, wi, self.eta, both)
         reflected, _ = fresnel_dielectric(np.where(valid, through_cos, cos), self.eta)
         transmitted = f4(1) - reflected
-        f = self.reflectance * (value * reflected) + self.transmittance * (through * transmitted)
+        f = value * reflected + through * transmitted  # one of them is 0
         pdf = density * reflected + through_density * transmitted
-        if not self.again:
-            return f, pdf
-        added, spread, chance = self._loss().lobe(self, wo, wi, self._inside, chance)
-        tint = np.where(wi[2] < 0, self.transmittance, self.reflectance)
-        return f + tint * added, pdf * (f4(1) - chance) + spread * chance
+        if self.again:
+            added, spread, chance = self._loss().lobe(self, wo, wi, self._inside, both, chance)
+            f, pdf = f + added, pdf * (f4(1) - chance) + spread * chance
+        return self._tint(wi) * f, pdf
+
+    def _tint(self, wi: Floats) -> Floats:
+        """Return the tint of what leaves along wi (3, n), (3, n) or (3, 1)."""
+        if self.reflectance is self.transmittance or np.array_equal(self.reflectance, self.transmittance):
+            return self.reflectance
+        return np.where(wi[2] < 0, self.transmittance, self.reflectance)
 
     def _loss(self) -> Loss:
         assert self.boundary is not None

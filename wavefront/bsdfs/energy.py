@@ -74,26 +74,30 @@ class Loss(NamedTuple):
     passed: float  # mean transmittance of a smooth boundary
     ior: float
 
-    def at(self, bsdf: Microfacets, w: Floats, inside: Bools) -> Floats:
-        """Return L of directions w (3, n) on the inside or not, (n,)."""
-        place = _place_of_refraction(bsdf.facets(), w)
+    def at(self, bsdf: Microfacets, w: Floats, inside: Bools, stretched: Floats | None = None) -> Floats:
+        """Return L of directions w (3, n) on the inside or not, and of a σ, if it is known, (n,)."""
+        place = _place_of_refraction(bsdf.facets(), w, stretched)
         return _directional(bsdf, self.lost, place, bsdf.mean_roughness, inside)
 
     def lobe(
-        self, bsdf: Microfacets, wo: Floats, wi: Floats, inside: Bools, chance: Floats | None = None
+        self,
+        bsdf: Microfacets,
+        wo: Floats,
+        wi: Floats,
+        inside: Bools,
+        stretched: tuple[Floats, Floats],
+        chance: Floats | None = None,
     ) -> tuple[Floats, Floats, Floats]:
         """Return value and density, and the probability to sample it, if it is not known, (n,) each."""
         below = wi[2] < 0
-        chance = self.at(bsdf, wo, inside) if chance is None else chance
-        here, beyond, crossing = self._sides(bsdf, inside)
-        part = np.where(below, crossing, f4(1) - crossing)
-        scale = INV_PI * np.where(inside, f4(self.ior * self.ior), f4(1)) / np.where(below, beyond, here)
-        value = chance * self.at(bsdf, wi, inside != below) * part * scale
-        return value, bsdf.facets().wide_pdf(wi) * part, chance
+        chance = self.at(bsdf, wo, inside, stretched[0]) if chance is None else chance
+        part, scale = self._sides(bsdf, inside, below)
+        value = chance * self.at(bsdf, wi, inside != below, stretched[1]) * scale
+        return value, bsdf.facets().wide_pdf(wi, stretched[1]) * part, chance
 
     def directions(self, bsdf: Microfacets, u: Floats, inside: Bools, lanes: Ints) -> Floats:
         """Return directions of the lobe (3, k) on some lanes, for u (3, n) and wo inside or not."""
-        crossing = np.broadcast_to(self._sides(bsdf, inside)[2], u[2].shape).take(lanes)
+        crossing = np.broadcast_to(self._sides(bsdf, inside, True)[0], u[2].shape).take(lanes)
         u = u.take(lanes, 1)
         second = u[2] >= 0.5
         wi = cosine_hemisphere(u)
@@ -101,10 +105,22 @@ class Loss(NamedTuple):
         wi[2] *= np.where(f4(2) * u[2] - second < crossing, f4(-1), f4(1))
         return wi
 
-    def _sides(self, bsdf: Microfacets, inside: Bools) -> tuple[Floats, Floats, Floats]:
-        """Return the means here and beyond, and the part of the lobe that is beyond the boundary."""
-        here, beyond = (_of_roughness(self.means, bsdf.mean_roughness, side) for side in (inside, ~inside))
-        return here, beyond, f4(self.passed) * np.minimum(here, beyond) / here
+    def _sides(self, bsdf: Microfacets, inside: Bools, below: Bools | bool) -> tuple[Floats, Floats]:
+        """Return the part of the lobe on a side of the boundary, and what products of L are scaled by."""
+        out, in_ = (_of_roughness(self.means, bsdf.mean_roughness, side) for side in (0, 1))
+        least, squared = f4(self.passed) * np.minimum(out, in_), f4(self.ior * self.ior)
+        cross = least / out, least / in_
+        parts = f4(1) - cross[0], cross[0], f4(1) - cross[1], cross[1]  # outside, above and below; inside
+        scales = (
+            parts[0] * INV_PI / out,
+            parts[1] * INV_PI / in_,
+            parts[2] * INV_PI * squared / in_,
+            parts[3] * INV_PI * squared / out,
+        )
+        number = np.add(inside, inside, dtype=np.intp) + below
+        if out.size == 1:
+            return np.concatenate(parts).take(number), np.concatenate(scales).take(number)
+        return np.choose(number, parts), np.choose(number, scales)
 
 
 def mean_over_cosines(reflectance: Callable[[Floats], Floats]) -> Floats:
@@ -113,10 +129,19 @@ def mean_over_cosines(reflectance: Callable[[Floats], Floats]) -> Floats:
     return sum(others, first)
 
 
-def gain(bsdf: Microfacets, wo: Floats, wi: Floats, mean_reflectance: Floats | None = None) -> Floats:
-    """Return by how much reflection grows, (n,); of a metal with a mean reflectance (3, n)."""
+def gain(
+    bsdf: Microfacets,
+    wo: Floats,
+    wi: Floats,
+    mean_reflectance: Floats | None = None,
+    stretched: tuple[Floats | None, Floats | None] = (None, None),
+) -> Floats:
+    """Return by how much reflection grows, (n,); of a metal with a mean reflectance (3, n).
+
+    `stretched` is as for `mirror_lobe`.
+    """
     table, facets = scaling(bsdf.shape).factor, bsdf.facets()
-    places = (_place_of_masking(facets, w) for w in (wo, wi))
+    places = (_place_of_masking(facets, *each) for each in zip((wo, wi), stretched, strict=True))
     one, other = (_directional(bsdf, table, place, bsdf.masking_roughness) for place in places)
     if mean_reflectance is None:
         return one * other
@@ -132,15 +157,16 @@ def part_kept(bsdf: Microfacets, mean_reflectance: Floats) -> Floats:
     return mean_reflectance * mean / (f4(1) - mean_reflectance * (f4(1) - mean))
 
 
-def _place_of_masking(facets: Facets, w: Floats) -> Place:
+def _place_of_masking(facets: Facets, w: Floats, stretched: Floats | None = None) -> Place:
     """Return where directions w (3, n) are in `Scaling`: by the azimuth and cosine of stretched ones."""
-    return facets.stretched_turn(w), np.abs(w[2]) / facets.stretched(w)
+    size = facets.stretched(w) if stretched is None else stretched
+    return facets.stretched_turn(w), np.abs(w[2]) / size
 
 
-def _place_of_refraction(facets: Facets, w: Floats) -> Place:
+def _place_of_refraction(facets: Facets, w: Floats, stretched: Floats | None = None) -> Place:
     """Return where directions w (3, n) are in `Loss`: masking follows stretched ones, refraction does not."""
-    z = np.abs(w[2])
-    return facets.turn(w), np.sqrt(np.minimum(f4(0.5) * (z + z / facets.stretched(w)), f4(1)))
+    z, size = np.abs(w[2]), facets.stretched(w) if stretched is None else stretched
+    return facets.turn(w), np.sqrt(np.minimum(f4(0.5) * (z + z / size), f4(1)))
 
 
 def _directional(

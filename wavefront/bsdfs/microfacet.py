@@ -114,9 +114,9 @@ class Facets(NamedTuple):
         wide[:2] /= self._scale()
         return normalize(self._turned_back(wide))
 
-    def wide_pdf(self, w: Floats) -> Floats:
-        """Density of directions w (3, n), (n,): half cosine-weighted ones, half the same `unstretched`."""
-        squared = self.stretched(w) ** 2
+    def wide_pdf(self, w: Floats, stretched: Floats) -> Floats:
+        """Density of directions w (3, n) of a σ, (n,): half cosine-weighted, half the same `unstretched`."""
+        squared = stretched * stretched
         area = self.alpha * (self.alpha if self.alpha_v is None else self.alpha_v)
         return np.abs(w[2]) * f4(0.5) * INV_PI * (f4(1) + area / (squared * squared))
 
@@ -182,8 +182,12 @@ class Facets(NamedTuple):
         so, si = stretched(wo), stretched(wi)
         return f4(2) * zi * (wo[2] + so) * self._smith(wo[2], zi, so, si) * self.visible_weight(wo, m)
 
-    def mirror_lobe(self, wo: Floats, wi: Floats) -> tuple[Floats, Floats, Floats]:
+    def mirror_lobe(
+        self, wo: Floats, wi: Floats, stretched: tuple[Floats, Floats] | None = None
+    ) -> tuple[Floats, Floats, Floats]:
         """Reflection by the microfacets without Fresnel, where wi (3, n) is above the surface.
+
+        `stretched` has σ of both directions, (n,) each, if it is known.
 
         Returns
         -------
@@ -198,7 +202,7 @@ class Facets(NamedTuple):
         h2 = dot(h, h)
         above = wi[2] > 0
         density = np.where(above, self.normal_density(h, h2), f4(0))
-        so, si = self.stretched(wo), self.stretched(wi)
+        so, si = stretched or (self.stretched(wo), self.stretched(wi))
         pdf = density * (f4(0.5) / (wo[2] + so))
         if self.beckmann:
             density = np.where(above, self._beckmann_density(h, h2), f4(0))
@@ -206,8 +210,12 @@ class Facets(NamedTuple):
         value = density * self._smith(wo[2], np.maximum(wi[2], f4(0)), so, si)
         return value, pdf, np.minimum(f4(0.5) * np.sqrt(h2), f4(1))
 
-    def refraction_lobe(self, wo: Floats, wi: Floats, eta: Floats) -> tuple[Floats, Floats, Floats, Bools]:
+    def refraction_lobe(
+        self, wo: Floats, wi: Floats, eta: Floats, stretched: tuple[Floats, Floats] | None = None
+    ) -> tuple[Floats, Floats, Floats, Bools]:
         """Refraction by the microfacets without Fresnel, where wi (3, n) is below the surface.
+
+        `stretched` is as for `mirror_lobe`.
 
         With s = wo + η·wi, whose direction is that of the microfacet's normal m, the squared
         denominator of Walter et al., eq. 21, is just |s|².
@@ -230,7 +238,7 @@ class Facets(NamedTuple):
         cos_o, cos_i = dot(wo, s) * scale, dot(wi, s) * scale
         valid = (wi[2] < 0) & (cos_o > 0) & (cos_i < 0)
         shared = np.where(valid, self.normal_density(s, s2) * np.abs(cos_o * cos_i) / s2, f4(0))
-        so, si = self.stretched(wo), self.stretched(wi)
+        so, si = stretched or (self.stretched(wo), self.stretched(wi))
         pdf = shared * (f4(2) * eta * eta / (wo[2] + so))
         if self.beckmann:
             shared = np.where(valid, self._beckmann_density(s, s2) * np.abs(cos_o * cos_i) / s2, f4(0))

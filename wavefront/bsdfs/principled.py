@@ -221,11 +221,12 @@ class Principled(Microfacets):
     def _base(self, wo: Floats, wi: Floats, chances: Chances) -> tuple[Floats, Floats]:
         """Metal, diffuse base, gloss and glass: value (3, n) and their part of the density (n,)."""
         facets = self.facets()
-        value, density, cos = facets.mirror_lobe(wo, wi)
+        both = facets.stretched(wo), facets.stretched(wi)
+        value, density, cos = facets.mirror_lobe(wo, wi, both)
         opaque = (f4(1) - self.metallic) * (f4(1) - self.transmission)
         metal = self._metal(cos)
         if self._metal_again:
-            metal = metal * gain(self, wo, wi, self._mean_metal())
+            metal = metal * gain(self, wo, wi, self._mean_metal(), both)
         gloss = self._gloss(cos)
         below = self._under_gloss(wo, wi) if self.conserve_energy else f4(1) - gloss.max(0)
         f = (metal * self.metallic + gloss * opaque) * value + self._matte(wo, wi, opaque * below)
@@ -237,12 +238,12 @@ class Principled(Microfacets):
         through, through_density = self._through(wo, wi, facets)
         pdf = pdf + chances.glass * (density * _chance(reflected) + through_density)
         if self._sheet_again or self._clear_again:
-            grown = gain(self, wo, wi)
+            grown = gain(self, wo, wi, None, both)
             value, through = value * grown, through * grown if self.thin else through
         once = value * reflected * clear + self._tint * (through * clear)
         if not self._clear_again:
             return f + once, pdf
-        added, spread, _ = self._loss().lobe(self, wo, wi, self._inside)
+        added, spread, _ = self._loss().lobe(self, wo, wi, self._inside, both)
         tint = np.where(wi[2] < 0, self._tint, f4(1))
         return f + once + tint * (added * clear), pdf + chances.again * spread
 
