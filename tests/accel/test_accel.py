@@ -377,7 +377,7 @@ def test_from_inside_outside_and_on_a_sphere(name: str) -> None:
 # --- build, and the choice of accelerator ---------------------------------------------------------
 
 
-@pytest.mark.parametrize("count", [1, 65, 1000, 20_000, 200_000])
+@pytest.mark.parametrize("count", [1, 65, 1000, 20_000, pytest.param(200_000, marks=pytest.mark.slow)])
 def test_the_tree_holds_each_primitive_once_inside_its_boxes(count: int) -> None:
     rng = np.random.default_rng(17)
     low = rng.uniform(-1, 1, (3, count)).astype(f4)

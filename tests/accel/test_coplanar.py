@@ -79,7 +79,7 @@ def test_faces_that_overlap_in_a_plane(name: str, order: tuple[int, ...], axes: 
 @pytest.mark.parametrize("shift", [(0.0, 0.0, 0.0), (0.3, -2.0, 40.0)])
 def test_faces_that_overlap_in_any_plane(name: str, count: int, shift: tuple[float, ...]) -> None:
     """Their corners are rounded, so no two have the same plane; still the lowest id is hit by every ray."""
-    for seed in range(4):
+    for seed in range(2):
         turned, n = orthogonal(seed), 2000
         triangles = (scattered(count, seed) @ turned + shift).astype(f4)
         origin, direction = rays_to(turned, np.array(shift), seed, n)

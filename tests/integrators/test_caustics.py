@@ -100,12 +100,12 @@ def part(first: int, end: int, **settings: Any) -> wf.Image:
 @pytest.mark.parametrize(
     "settings",
     [
-        {"workers": 1, "executor": "threads", "wave_size": 97},
         {"workers": 3, "executor": "threads", "wave_size": 1000},
         {"workers": 2, "executor": "processes", "wave_size": 500},
         pytest.param({"workers": 2, "executor": "spawn"}, marks=pytest.mark.slow),
         pytest.param({"workers": 2, "executor": "forkserver"}, marks=pytest.mark.slow),
-        {"max_memory": "4GB"},
+        pytest.param({"max_memory": "4GB"}, marks=pytest.mark.slow),
+        pytest.param({"workers": 1, "executor": "threads", "wave_size": 97}, marks=pytest.mark.slow),
     ],
 )
 def test_no_bit_depends_on_workers_executor_or_waves(settings: dict[str, Any]) -> None:
@@ -131,7 +131,7 @@ def test_no_bit_depends_on_embree_where_numpy_traces(monkeypatch: pytest.MonkeyP
     assert digest(image) == expected
 
 
-@pytest.mark.parametrize("workers", [1, 2])
+@pytest.mark.parametrize("workers", [2, pytest.param(1, marks=pytest.mark.slow)])
 def test_no_bit_depends_on_a_lack_of_memory(workers: int, monkeypatch: pytest.MonkeyPatch) -> None:
     trace, tried = tracing.trace_light, []
 

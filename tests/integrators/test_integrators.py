@@ -44,8 +44,8 @@ def test_indirect_light_agrees(max_bounces: int) -> None:
     assert_same_images(naive, full, 0.003)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("sampler", "spp"), [("independent", 256), ("bluenoise", 128)])
-@pytest.mark.first(1)
 def test_samplers_agree(sampler: str, spp: int) -> None:
     """Plain random numbers and blue noise give the same picture as Sobol points."""
     assert_same_images(room("full", 8, 128), room("full", 8, spp, sampler), 0.004)

@@ -225,6 +225,7 @@ def lights(kind: type) -> TriangleLights | RectangleLights:
 
 
 @pytest.mark.parametrize("kind", [TwoSidedTriangleLights, TwoSidedRectangleLights])
+@pytest.mark.first(1)
 def test_the_contract(kind: type) -> None:
     """χ², densities and radiance agree, on both sides."""
     record = lights(kind)

@@ -38,7 +38,7 @@ def tree(k: int) -> LightTreeSampler:
     return LightTreeSampler(*lights(k), 3**0.5)
 
 
-@pytest.mark.parametrize("k", [1, 2, 3, 16, 17, 257, 4097])
+@pytest.mark.parametrize("k", [1, 3, 17, 4097])
 def test_sampling_follows_the_probabilities(k: int) -> None:
     """Each of k lights is drawn as often as its pmf says, inside the scene and outside, for extreme u too."""
     choice, n = tree(k), 1 << 18

@@ -54,7 +54,7 @@ def test_densities_are_one_over_the_image(shape: tuple[int, int]) -> None:
 
 @pytest.mark.parametrize("opaque", [True, False])
 @pytest.mark.parametrize("normal", NORMALS)
-@pytest.mark.first(3)
+@pytest.mark.first(2)
 def test_the_contract_holds_for_each_normal(normal: tuple[float, ...], opaque: bool) -> None:
     turn = np.linalg.qr([[3.0, 1, 2], [-1, 4, 1], [1, -2, 5]])[0]
     turn *= np.sign(np.linalg.det(turn))

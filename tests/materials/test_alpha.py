@@ -203,8 +203,10 @@ def test_estimators_agree() -> None:
     assert_same_images(naive, full, 0.02)
 
 
-@pytest.mark.parametrize("cut", [{"wave_size": 1}, {"wave_size": 64}, {"wave_size": 50, "workers": 3}])
-@pytest.mark.parametrize("integrator", ["naive", "full"])
+@pytest.mark.parametrize(
+    ("integrator", "cut"),
+    [("full", {"wave_size": 1}), ("naive", {"wave_size": 64}), ("full", {"wave_size": 50, "workers": 3})],
+)
 def test_waves_and_workers_change_no_bit(integrator: str, cut: dict) -> None:
     """Numbers go by surfaces along a ray, not by who asks for them."""
     scene = leaves((6, 5))

@@ -52,6 +52,7 @@ def test_decisions_come_at_fixed_counts() -> None:
 
 
 @pytest.mark.parametrize("name", SCENES)
+@pytest.mark.first(1)
 def test_noise_is_the_true_error(name: str) -> None:
     """`noise=0.02` is a relative error between 1 and 3 % against the converged picture."""
     scene = SCENES[name]((16, 12))

@@ -33,6 +33,7 @@ def render(sampler: str, spp: int, seed: int) -> np.ndarray:
     return wf.render(scene, spp, max_bounces=7, seed=seed, sampler=sampler, accel="numpy", progress=False).rgb
 
 
+@pytest.mark.slow
 def test_sobol_halves_the_error(converged: np.ndarray) -> None:
     """At 64 spp the MSE on the Cornell box is at most half of independent's."""
     sobol, independent = (errors(sampler, 64, converged).mean() for sampler in ("sobol", "independent"))

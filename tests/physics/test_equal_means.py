@@ -170,7 +170,7 @@ def test_pictures_by_default(name: str) -> None:
 @pytest.mark.parametrize(
     ("name", "due"),
     [
-        ("furnace of 0.5, 8 bounces", "shared"),
+        pytest.param("furnace of 0.5, 8 bounces", "shared", marks=pytest.mark.slow),
         ("point light in a sphere", "shared"),
         ("half-hidden rectangle", "branches 4"),
         ("point light, offset 1.5", "branches 1"),

@@ -72,8 +72,14 @@ def stopped_after(number: int, path: Path, **settings: Any) -> wf.Image:
 # --- The same bits ------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("view", VIEWS)
-@pytest.mark.parametrize("seed", range(2))
+@pytest.mark.parametrize(
+    ("seed", "view"),
+    [
+        pytest.param(seed, view, marks=[] if seed == number else pytest.mark.slow)
+        for seed in range(2)
+        for number, view in enumerate(VIEWS)
+    ],
+)
 def test_a_render_that_is_stopped_goes_on_with_the_same_bits(tmp_path: Path, seed: int, view: str) -> None:
     rng, path, spp = random.Random(seed), tmp_path / "out.wfck", 23
     aovs = ("direct", "indirect", *(("alpha", "albedo", "depth") if view == "picture" else ()))
@@ -104,8 +110,14 @@ def test_worker_processes_go_on_with_the_same_bits(tmp_path: Path, view: str) ->
     assert digest(resumed) == digest(wf.render(scene(), 12, **camera))
 
 
-@pytest.mark.parametrize("view", VIEWS)
-@pytest.mark.parametrize("after", [10, 40])
+@pytest.mark.parametrize(
+    ("after", "view"),
+    [
+        pytest.param(after, view, marks=[] if first == second else pytest.mark.slow)
+        for first, after in enumerate((40, 10))
+        for second, view in enumerate(VIEWS)
+    ],
+)
 @pytest.mark.filterwarnings("ignore:noise=0.07 was not reached")
 def test_adaptive_renders_go_on_with_the_same_decisions(tmp_path: Path, after: int, view: str) -> None:
     """Whether they are stopped before, within or after a pass over some of the pixels."""
@@ -678,7 +690,7 @@ def kill_and_resume(command: list[str], folder: Path, kills: int, seed: int) -> 
     "command", ["picture", pytest.param("sensors", marks=pytest.mark.slow)], indirect=True
 )
 def test_kill_9_costs_no_bit(command: list[str], tmp_path: Path) -> None:
-    assert len(kill_and_resume(command, tmp_path, 3, seed=1)) == 3
+    assert len(kill_and_resume(command, tmp_path, 1, seed=1)) == 1
 
 
 @pytest.mark.slow
@@ -699,6 +711,7 @@ def test_kill_9_at_fifty_moments_costs_no_bit(command, tmp_path, capsys):
         (signal.Signals.__members__.get("SIGHUP"), 129, False),
     ],
 )
+@pytest.mark.first(1)
 def test_signals_keep_the_render(command, tmp_path, number, status, background):
     """Ctrl-C, SIGTERM and SIGHUP write the checkpoint and the picture so far; the same command goes on.
 

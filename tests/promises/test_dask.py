@@ -187,6 +187,7 @@ def test_a_closed_client_is_an_error() -> None:
             wf.render(scenes.everything(), 1, executor=client, workers=1)
 
 
+@pytest.mark.slow
 def test_the_picture_outlives_the_cluster() -> None:
     """A scheduler that is lost, or begins anew without workers, ends the render with the picture so far."""
     cluster = {"n_workers": 1, "processes": False, "dashboard_address": ":0"}

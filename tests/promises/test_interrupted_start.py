@@ -104,7 +104,7 @@ def tries(executor: str, accel: str, when: str, count: int, seed: int = 1) -> li
     return [seconds for seconds, _ in found]
 
 
-@pytest.mark.parametrize("executor", ["processes", "threads"])
+@pytest.mark.parametrize("executor", ["processes", pytest.param("threads", marks=pytest.mark.slow)])
 def test_ctrl_c_while_workers_start(executor: str) -> None:
     """At a few moments: while the first processes are forked, or at any before the first samples."""
     assert len(tries(executor, "auto", "fork" if executor == "processes" else "any", 3)) == 3

@@ -43,6 +43,7 @@ except (wf.RenderError, wf.SceneError) as error:
 @pytest.mark.parametrize(
     ("megabytes", "executor"), [(5, "threads"), (70, "processes"), (70, "threads"), (160, "processes")]
 )
+@pytest.mark.first(2)
 def test_without_memory_there_is_an_error(megabytes: int, executor: str) -> None:
     """One that has a type, with the picture of the waves that were done; never an abort of BLAS's."""
     script = LIMITED.format(mesh="([[0, 0, 0], [1, 0, 0], [0, 1, 0]], [[0, 1, 2]])")

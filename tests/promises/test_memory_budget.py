@@ -109,7 +109,7 @@ def test_the_least_memory_that_is_named_is_enough(monkeypatch: pytest.MonkeyPatc
         make_budget(least - 1, (64, 64), 8, None, processes=False)
 
 
-@pytest.mark.parametrize("executor", ["threads", "processes"])
+@pytest.mark.parametrize("executor", ["threads", pytest.param("processes", marks=pytest.mark.slow)])
 def test_no_bit_depends_on_the_budget(executor: str) -> None:
     options: dict[str, Any] = {"spp": 16, "executor": executor, "progress": False, "size": (64, 48)}
     scene, found = scenes.everything(), set()
@@ -140,8 +140,9 @@ class LimitedMemory:
 
 @pytest.mark.parametrize(
     ("executor", "workers", "fails_at"),
-    [("threads", 1, 0), ("threads", 2, 3), ("processes", 1, 3), ("processes", 2, 0)],
+    [("threads", 2, 3), ("processes", 2, 0), ("threads", 1, 0), ("processes", 1, 3)],
 )
+@pytest.mark.first(2)
 def test_out_of_memory_halves_the_wave_and_goes_on(executor: str, workers: int, fails_at: int) -> None:
     """With the same bits, also when memory runs out in the middle of a render."""
     scene, options = scenes.everything(), {"spp": 12, "progress": False, "size": (24, 18)}

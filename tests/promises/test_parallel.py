@@ -308,9 +308,17 @@ def test_a_daemon_has_threads() -> None:
 # --- pictures -------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("accel", ["numpy", "auto"])
 @pytest.mark.parametrize("executor", EXECUTORS)
-@pytest.mark.parametrize("kind", ["picture", "irradiance", "fluence"])
+@pytest.mark.parametrize(
+    ("kind", "accel"),
+    [
+        *(("picture", "auto"), ("irradiance", "numpy"), ("fluence", "auto")),
+        *(
+            pytest.param(*each, marks=pytest.mark.slow)
+            for each in (("picture", "numpy"), ("irradiance", "auto"), ("fluence", "numpy"))
+        ),
+    ],
+)
 def test_the_executor_changes_no_bit(executor: str, accel: str, kind: str) -> None:
     options: dict[str, Any] = {"accel": accel, "progress": False, "wave_size": 500}
     if kind != "picture":

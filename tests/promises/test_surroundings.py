@@ -46,6 +46,7 @@ def expected() -> bytes:
 
 
 @pytest.mark.parametrize("executor", NAMES)
+@pytest.mark.first(1)
 def test_two_renders_at_once(executor: str, expected: bytes) -> None:
     """In two threads; BLAS has as many threads as before when both are over."""
     before = threadpool_info()

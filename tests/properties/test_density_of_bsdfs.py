@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from hypothesis import assume, given
 from hypothesis import strategies as st
-from jacobians import columns, doubles, few, inner, jacobian, some
+from jacobians import columns, doubles, fewest, inner, jacobian, some
 from measurements import measured
 
 from wavefront import bsdfs
@@ -322,7 +322,7 @@ def test_samples_keep_their_promises(kind, data, z, inside, u):
 
 
 @integrals
-@few
+@fewest
 @given(data=st.data(), z=cosines, inside=st.booleans())
 def test_densities_integrate_to_the_chance_of_a_sample(kind, data, z, inside):
     """Over the sphere, by the midpoint rule; delta lobes and directions to the wrong side are left out."""

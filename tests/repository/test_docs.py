@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 
 import wavefront as wf
+from wavefront.integrators import training
 
 ROOT = Path(__file__).parents[2]
 PAGES = sorted([*(ROOT / "docs").glob("*.md"), *(ROOT / "docs" / "how_to").glob("*.md")])
@@ -34,13 +35,13 @@ def blocks():
 
 @pytest.fixture
 def few_samples(tmp_path, monkeypatch):
-    """Let renders take one sample per pixel, of few pixels by default, in an empty folder."""
+    """Let renders take one sample of each of few pixels, and guides learn little, in an empty folder."""
     render, render_many = wf.render, wf.render_many
 
     def quick(scene, spp=MOST_SPP, noise=None, **options):
         few = {} if "samples" in options else {"spp": min(spp, MOST_SPP)}
         if "camera" not in options and getattr(scene, "camera", None) is None:
-            few["size"] = options.pop("size", (96, 64))
+            few["size"] = options.pop("size", (48, 32))
         return render(scene, **few, progress=False, **options)
 
     def quick_many(scene, cameras, spp=MOST_SPP, **options):
@@ -48,6 +49,7 @@ def few_samples(tmp_path, monkeypatch):
 
     monkeypatch.setattr(wf, "render", quick)
     monkeypatch.setattr(wf, "render_many", quick_many)
+    monkeypatch.setattr(training, "PATHS", 1 << 13)
     monkeypatch.chdir(tmp_path)
 
 

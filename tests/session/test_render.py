@@ -35,7 +35,10 @@ def whole(integrator: str, sampler: str) -> bytes:
 @pytest.mark.filterwarnings("ignore:the naive integrator")
 @pytest.mark.parametrize(
     ("integrator", "sampler"),
-    [*((integrator, "sobol") for integrator in scenes.ALL), *(("full", sampler) for sampler in SAMPLERS)],
+    [
+        *((integrator, "sobol") for integrator in scenes.ALL),
+        *(("full", sampler) for sampler in SAMPLERS if sampler != "sobol"),
+    ],
 )
 def test_waves_and_workers_change_no_bit(integrator: str, sampler: str) -> None:
     """Results are added in the order of the work, not of its completion."""
