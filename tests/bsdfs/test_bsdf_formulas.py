@@ -514,8 +514,7 @@ def test_clear_base(thin):
     bsdf = Principled(COLOR, metallic, roughness, 1.5, clear, thin=thin, specular=0.0, multiscatter=False)
     wo, wi = pairs()
     value, cos = reflection(wo, wi, roughness**2)
-    face = fresnel(cos, 1.5)
-    reflected = 2 * face / (1 + face) if thin else face
+    reflected = sheet_series(cos, 1.5) if thin else fresnel(cos, 1.5)
     part = (1 - metallic) * clear
     diffuse = (1 - metallic) * (1 - clear) * column(COLOR) / np.pi
     exact = metallic * schlick(column(COLOR), cos) * value + part * reflected * value + diffuse
@@ -575,8 +574,8 @@ def test_shares_of_the_lobes(color, sheen, roughness):
     varnish = coat * (0.1 + schlick(0.04, wo[2].astype(float)))
     diffuse = opaque * (luminance(column(color)) + 0.01) + sheen * 0.5 * (0.2 + away)
     rough, smooth = (Facets(F4(r**2)).mirror_lobe(wo, wi)[1] for r in (roughness, 0.3))
-    face = fresnel(dot(wo, half_vector(wo, wi)), ior)
-    lobes = gloss * rough + glass * rough * 2 * face / (1 + face) + varnish * smooth + diffuse * wi[2] / np.pi
+    sheet = sheet_series(dot(wo, half_vector(wo, wi)).astype(float), ior)
+    lobes = gloss * rough + glass * rough * sheet + varnish * smooth + diffuse * wi[2] / np.pi
     assert bsdf.pdf(wo, wi) == pytest.approx(lobes / (gloss + glass + varnish + diffuse), rel=1e-3)
 
 

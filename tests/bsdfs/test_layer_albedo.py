@@ -24,6 +24,12 @@ def fresnel(ior: float) -> np.ndarray:
     return polarizations(ior).mean(0)
 
 
+def of_a_sheet(ior: float) -> np.ndarray:
+    """Unpolarized reflectance of both faces."""
+    faces = polarizations(ior)
+    return (2 * faces / (1 + faces)).mean(0)
+
+
 REFLECTED, THROUGH = np.array([[0.9], [0.3], [0.1]]), np.array([[0.2], [0.6], [1.0]])
 
 
@@ -34,8 +40,7 @@ def test_glass_reflects_and_lets_through_its_tints(ior: float, roughness: float)
     tints = {"reflectance": REFLECTED[:, 0], "transmittance": THROUGH[:, 0]}
     due = REFLECTED * part + THROUGH * (1 - part)
     np.testing.assert_allclose(albedo_of(wf.Dielectric(ior, roughness, **tints), WO), due, rtol=1e-5)
-    faces = polarizations(ior)
-    sheet = (2 * faces / (1 + faces)).mean(0)  # of both faces
+    sheet = of_a_sheet(ior)
     due = REFLECTED * sheet + THROUGH * (1 - sheet)
     np.testing.assert_allclose(albedo_of(wf.ThinDielectric(ior, roughness, **tints), WO), due, rtol=1e-5)
 
@@ -44,8 +49,7 @@ def test_glass_reflects_and_lets_through_its_tints(ior: float, roughness: float)
 @pytest.mark.parametrize("ior", [1.3, 2.4])
 def test_clear_parts_of_principled_are_glass(ior: float, thin: bool) -> None:
     """What is let through has the base color; metal and the opaque part have their own."""
-    part = fresnel(ior)
-    part = 2 * part / (1 + part) if thin else part
+    part = of_a_sheet(ior) if thin else fresnel(ior)
     color, options = THROUGH[:, 0], {"roughness": 0.2, "ior": ior}
     clear = THROUGH * (1 - part) + part
     found = albedo_of(wf.Principled(color, transmission=1.0, thin=thin, **options), WO)

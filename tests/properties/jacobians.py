@@ -15,6 +15,7 @@ import numpy as np
 from hypothesis import assume, settings
 from hypothesis import strategies as st
 
+from wavefront.bsdfs.albedo import _dielectric_tables as dielectric_tables
 from wavefront.bsdfs.albedo import gloss_tables
 from wavefront.bsdfs.sheen import _albedo_table as sheen_table
 
@@ -46,8 +47,8 @@ points_of_the_square = st.tuples(inner, inner)
 @contextmanager
 def doubles() -> Iterator[None]:
     """Let the formulas of samplers, materials and lights run in float64: `f4` means float64 in them."""
-    gloss_tables()
-    sheen_table()  # both are cached, and stay float32
+    for table in (dielectric_tables, gloss_tables, sheen_table):
+        table()  # it is cached, and stays float32
     replaced = []
     for name, module in list(sys.modules.items()):
         if module is None or not (name.startswith(ROOMS) or name in ALONE):

@@ -18,7 +18,7 @@ from .albedo import gloss_tables, lookup
 from .base import BsdfSample, weigh
 from .dielectric import LEAST_BEND
 from .energy import Loss, Shape, gain, loss, mean_over_cosines, part_kept
-from .fresnel import fresnel_dielectric
+from .fresnel import fresnel_dielectric, fresnel_sheet
 from .microfacet import Facets, alpha_of, reflect, refract
 from .rough import Microfacets, angle
 from .sheen import sheen_albedo, sheen_lobe
@@ -299,6 +299,8 @@ class Principled(Microfacets):
 
     def _fresnel(self, cos: Floats) -> tuple[Floats, Floats]:
         """Exact reflectance of the clear part, with a film (3, n), and the refracted cosine, each (n,)."""
+        if self.thin and not self.has_film:  # a film keeps the mean of both polarizations
+            return fresnel_sheet(cos, self.ior), cos
         index = self.ior if self.thin else self._eta()
         face, refracted = fresnel_dielectric(cos, index)
         if self.has_film:
