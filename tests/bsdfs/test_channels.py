@@ -82,7 +82,7 @@ def test_pictures_are_those_of_the_indices_one_by_one(roughness):
     """Unbiased: a ball of dispersive glass, also in a mix, against three balls."""
 
     def scene(ior):
-        bsdf = Mix(Dielectric(ior, roughness), Diffuse(0.5), 0.2)
+        bsdf = Mix(Dielectric(ior, roughness, multiscatter=False), Diffuse(0.5), 0.2)
         ball, floor = wf.Sphere((0, 0, 0), 1, material=bsdf), wf.Rectangle((-2, -1, 2), (4, 0, 0), (0, 0, -4))
         camera = wf.Camera.look_at((0, 1, 4), (0, 0, 0), fov=35, size=(16, 16))
         return wf.Scene([ball, floor], [wf.Environment(SKY)], camera)
