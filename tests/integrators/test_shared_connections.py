@@ -232,7 +232,8 @@ def test_what_nobody_reaches_stays_with_its_path(monkeypatch: pytest.MonkeyPatch
     """The others receive light times the throughput of their first points."""
     rng = np.random.default_rng(1)
     lit = SimpleNamespace(
-        groups=[(slice(0, 2), wf.Diffuse(0.5))], surface=MagicMock(unmapped=None, __len__=lambda _: 2)
+        groups=[(slice(0, 2), wf.Diffuse(0.5))],
+        surface=MagicMock(unmapped=None, folds=None, __len__=lambda _: 2),
     )
     lit.albedo = lambda: np.ones((3, 2), f4)
     paths = SimpleNamespace(slot=np.array([1, 0]), throughput=rng.uniform(0.2, 1, (3, 2)).astype(f4))
@@ -244,7 +245,7 @@ def test_what_nobody_reaches_stays_with_its_path(monkeypatch: pytest.MonkeyPatch
     tiles = WaveTiles.of(np.array([0, 0], np.uint32), np.array([0, 1], np.uint32), PictureTiles(100, 1))
     arrived = rng.uniform(0.2, 1, (3, MEMBERS_OF_TILES, tiles.count)).astype(f4)
 
-    def first_of(scene, lit, albedo, lane_in):
+    def first_of(lit, albedo, lane_in):
         return SimpleNamespace(present=lane_in >= 0)
 
     def arriving(scene, first, points, lights, numbers, glossy):

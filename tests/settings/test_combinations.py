@@ -14,8 +14,9 @@ import pytest
 from scenes import cornell_box
 
 import wavefront as wf
-from wavefront.integrators import training, tuning
+from wavefront.integrators import training
 from wavefront.integrators.tuning import Run, Trial
+from wavefront.sampling import tiles
 from wavefront.session import choice
 from wavefront.settings import SETTINGS
 from wavefront.settings.combinations import EXCLUSIONS, MEDIA, SETTING_OF, Exclusion, table
@@ -144,7 +145,7 @@ def test_auto_leaves_re_use_out(each: Exclusion, monkeypatch: pytest.MonkeyPatch
         return replace(render(trial, branches, reuse, guided), variance=variance, rays=1)
 
     monkeypatch.setattr(choice, "LEAST_PIXELS", 1)
-    monkeypatch.setattr(tuning, "PIXELS_PER_TILE", 100)
+    monkeypatch.setattr(tiles, "PIXELS_PER_TRIED", 100)
     monkeypatch.setattr(Trial, "_render", pays)
     image = wf.render(cornell_box((28, 28)), 1, progress=False)
     assert image.metadata["reuse"] is True
