@@ -318,6 +318,7 @@ def lamp_at_the_ceiling(size: tuple[int, int] = (16, 16)) -> wf.Scene:
     return wf.Scene([inside, lamp, ball], camera=camera)
 
 
+@pytest.mark.slow
 def test_guided_pictures_agree_with_plain_ones_and_have_less_noise() -> None:
     plain = wf.render(lamp_at_the_ceiling(), 256, progress=False)
     guided = wf.render(lamp_at_the_ceiling(), 256, guide=True, seed=1, progress=False)

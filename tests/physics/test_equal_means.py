@@ -173,7 +173,7 @@ def test_pictures_by_default(name: str) -> None:
         pytest.param("furnace of 0.5, 8 bounces", "shared", marks=pytest.mark.slow),
         ("point light in a sphere", "shared"),
         ("half-hidden rectangle", "branches 4"),
-        ("point light, offset 1.5", "branches 1"),
+        pytest.param("point light, offset 1.5", "branches 1", marks=pytest.mark.slow),
     ],
 )
 def test_the_trial_keeps_means(name: str, due: str, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -35,7 +35,7 @@ KINK = 0.02  # by which one-sided derivatives may differ where the map is smooth
 LARGEST_BOUND = 0.02  # of the error of a derivative, relative
 
 # parts of the examples of the profile: what one costs differs
-some = settings(max_examples=settings.default.max_examples * 2 // 5)
+some = settings(max_examples=settings.default.max_examples // 4)
 few = settings(max_examples=settings.default.max_examples // 10)
 fewest = settings(max_examples=settings.default.max_examples // 20)
 

@@ -282,6 +282,7 @@ def executed(cells: list[str], folder: Path) -> tuple[list[list[dict]], list[lis
 
 
 @pytest.mark.filterwarnings("default")  # of the client that runs the notebook
+@pytest.mark.slow
 def test_a_notebook_shows_the_picture_refining_in_place(tmp_path: Path) -> None:
     (outputs,), (updates,) = executed([REFINE.format(spp=300)], tmp_path)
     pictures = [output for output in outputs if output["output_type"] == "display_data"]

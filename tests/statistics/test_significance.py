@@ -86,7 +86,7 @@ def _without_flip(monkeypatch) -> None:
 
 
 @pytest.mark.parametrize("draw", [gaussian, heavy, fireflies, flashes, edges])
-@pytest.mark.parametrize("spp", [(2, 2), (16, 16), (16, 2048)], ids=str)
+@pytest.mark.parametrize("spp", [(2, 2), (16, 16), pytest.param((16, 2048), marks=pytest.mark.slow)], ids=str)
 def test_false_alarms(draw, spp) -> None:
     """Are at most as frequent as the p-values say, for any distribution of samples."""
     rng, (runs, size) = (
