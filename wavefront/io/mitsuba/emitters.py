@@ -39,7 +39,7 @@ def _point(node: Node, job: Job) -> PointLight:
 @plugin("spot", "emitter", "to_world intensity texture cutoff_angle beam_width")
 def _spot(node: Node, job: Job) -> SpotLight:
     matrix = node.matrix()
-    cutoff = node.number("cutoff_angle", 20.0)
+    cutoff = node.number("cutoff_angle", 20.0, lambda x: 0 < x <= 90, "above 0 and at most 90 degrees")
     return SpotLight(
         matrix[:3, 3],
         _constant(node, "intensity", job),
