@@ -96,7 +96,7 @@ def read_vti(path: str, data: bytes, budget: Budget, name: str | None = None) ->
     except ImportError as error:
         raise SceneError("files of VTK need vtk: pip install vtk") from error
 
-    reader = vtkXMLImageDataReader()
+    reader: Any = vtkXMLImageDataReader()  # its stubs know no bytes
     reader.SetReadFromInputString(True)
     reader.SetInputString(data)
     shown = vtkObject.GetGlobalWarningDisplay()
