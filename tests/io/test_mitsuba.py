@@ -485,7 +485,7 @@ def test_spots_and_projectors() -> None:
     slide = {"type": "bitmap", "data": np.ones((2, 4, 3), np.float32)}
     spot = light("spot", cutoff_angle=30.0, beam_width=15.0, intensity=2.0, texture=slide, to_world=TURN)
     assert (spot.angle, spot.blend, spot.falloff) == (60, 0.5, "linear")
-    with pytest.raises(wf.SceneError, match="cutoff_angle is 0.*above 0 and at most 90"):
+    with pytest.raises(wf.SceneError, match=r"cutoff_angle is 0.*above 0 and at most 90"):
         light("spot", cutoff_angle=0.0)
     assert spot.direction.tolist() == [1, 0, 0]
     screen = {"type": "rectangle", "bsdf": {"type": "diffuse", "reflectance": 1.0}}
