@@ -71,6 +71,7 @@ class Bsdf(Parametrized, ABC):
     invisible: bool = False  # light passes as if there were no surface
     catches_shadows: bool = False  # the camera sees only shadows on it
     dimensions: int = 2  # rows of u that sample_f reads
+    indices: ClassVar[tuple[str, ...]] = ()  # parameters that are indices of refraction of what it encloses
     given_elsewhere: ClassVar[dict[str, str]] = MATERIAL_ARGUMENTS  # for messages
     specular: bool = False  # every lobe is a delta: f and pdf are 0, light sampling is skipped
     back_facing: Bools | None = None  # (n,) wo is on the back, for some that are bound; unbound, on the front
@@ -113,13 +114,20 @@ class Bsdf(Parametrized, ABC):
         return False
 
     def bind(self, surface: SurfaceInteraction) -> Self:
-        """Return this BSDF with its spatial parameters looked up at `surface` (n columns)."""
-        varying = {name: value for name, value in vars(self).items() if isinstance(value, BaseTexture)}
-        if not varying:
+        """Return this BSDF with its spatial parameters looked up at `surface` (n columns).
+
+        Its `indices` are then relative to the index of refraction of what is around.
+        """
+        found = {
+            name: value.at(surface) for name, value in vars(self).items() if isinstance(value, BaseTexture)
+        }
+        if surface.index_around is not None and self.encloses:
+            for name in self.indices:
+                found[name] = found.get(name, getattr(self, name)) / surface.index_around
+        if not found:
             return self
         bound = copy(self)
-        for name, value in varying.items():
-            vars(bound)[name] = value.at(surface)  # not by assignment, which would check it
+        vars(bound).update(found)  # not by assignment, which would check them
         return bound
 
     def albedo(self, wo: Floats) -> Floats:

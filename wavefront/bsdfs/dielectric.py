@@ -90,6 +90,8 @@ class Dielectric(RefractiveBsdf):
     >>> prism = wf.Dielectric((1.50, 1.51, 1.53))
     """
 
+    indices = ("ior",)
+
     ior: Parameter[Color] = Parameter(refractive_indices, default=1.5)
     film_thickness: Parameter[Scalar] = Parameter(thickness, default=0.0, kw_only=True)
     film_ior: Parameter[Scalar] = Parameter(refractive_index, default=1.33, kw_only=True)
@@ -132,7 +134,6 @@ class Dielectric(RefractiveBsdf):
         """Return the BSDF bound to `surface`, with `eta` inverted where `wo` is inside."""
         bound = copy(super().bind(surface))
         if surface.index_around is not None:
-            vars(bound)["ior"] = bound.ior / surface.index_around  # not by assignment, which would check it
             bound.again = False  # its tables are those of one index
         bound._inside = surface.back_facing
         bound.eta = np.where(surface.back_facing, f4(1) / bound.ior, bound.ior)

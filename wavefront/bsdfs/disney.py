@@ -117,6 +117,8 @@ class Disney(DisneyBase):
     >>> paint = wf.Disney((0.2, 0.1, 0.6), 0.4, clearcoat=1, flatness=0.5)
     """
 
+    indices = ("ior",)
+
     metallic: Parameter[Scalar] = Parameter(scalar, default=0.0)
     clearcoat: Parameter[Scalar] = Parameter(scalar, default=0.0, kw_only=True)
     clearcoat_gloss: Parameter[Scalar] = Parameter(scalar, default=0.0, kw_only=True)
@@ -130,8 +132,6 @@ class Disney(DisneyBase):
         """Return the BSDF bound to `surface`, with the side of `wo`."""
         bound = copy(super().bind(surface))
         bound.back_facing = surface.back_facing if self.transmissive else None
-        if surface.index_around is not None:
-            vars(bound)["ior"] = bound.ior / surface.index_around  # not by assignment, which would check it
         return bound
 
     def evaluate(self, wo: Floats, wi: Floats) -> tuple[Floats, Floats]:

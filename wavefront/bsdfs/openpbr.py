@@ -49,6 +49,7 @@ class OpenPBRBsdf(JointBsdf):
     """
 
     dimensions = 3
+    indices = ("specular_ior", "coat_ior")
 
     base_weight: Parameter[Scalar] = Parameter(scalar, default=1.0, kw_only=True)
     base_color: Parameter[Color] = Parameter(color, default=0.8, kw_only=True)
@@ -124,9 +125,6 @@ class OpenPBRBsdf(JointBsdf):
     def bind(self, surface: SurfaceInteraction) -> Self:
         """Return the BSDF bound to `surface`, with the side of `wo`."""
         bound = copy(super().bind(surface))
-        if surface.index_around is not None and self.encloses:
-            for name in ("specular_ior", "coat_ior"):  # relative to what is around
-                vars(bound)[name] = getattr(bound, name) / surface.index_around
         bound._layers = bound._filled(copy(self._layers).bind(surface))
         return bound
 
@@ -188,6 +186,8 @@ class OpenPBRBsdf(JointBsdf):
 class Layers(Principled):
     """The layers of OpenPBR at the points of a wave. Its parameters are set by `OpenPBRBsdf`."""
 
+    indices = ()  # they are relative already
+
     rough_base: bool
     index_below: Floats  # (n,) of the base relative to the coat, at least 1
     metal_color: Floats  # (3, n) reflectance of the metal along the normal
@@ -200,9 +200,6 @@ class Layers(Principled):
     coat_ior: Floats  # (n,)
     coat_color: Floats  # (3, n)
     darkening: Floats  # (n,)
-
-    def _set_around(self, index: Floats) -> None:
-        """Nothing: `OpenPBRBsdf` gives them relative indices."""
 
     def evaluate(self, wo: Floats, wi: Floats) -> tuple[Floats, Floats]:
         """Return `f` and `pdf` of all lobes: the base, then coat and fuzz layered over it."""

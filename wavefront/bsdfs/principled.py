@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from copy import copy
 from functools import partial
-from typing import Any, NamedTuple, Self
+from typing import Any, ClassVar, NamedTuple, Self
 
 import numpy as np
 
@@ -98,6 +98,7 @@ class Principled(Microfacets):
     """
 
     dimensions = 3
+    indices: ClassVar[tuple[str, ...]] = ("ior",)
 
     base_color: Parameter[Color] = Parameter(color, default=0.8)
     metallic: Parameter[Scalar] = Parameter(scalar, default=0.0)
@@ -144,12 +145,7 @@ class Principled(Microfacets):
             bound.back_facing = surface.back_facing
             if surface.index_around is not None:
                 bound._clear_again = False  # its tables are those of one index
-                bound._set_around(surface.index_around)
         return bound
-
-    def _set_around(self, index: Floats) -> None:
-        """Make the index relative to that of what is around, (n,)."""
-        vars(self)["ior"] = self.ior / index
 
     def albedo(self, wo: Floats) -> Floats:
         """Return about the albedo of all lobes, layered as in `evaluate`."""
