@@ -25,6 +25,17 @@ def toward(height: float, azimuth: float = 37.0) -> np.ndarray:
     return np.array([np.cos(h) * np.sin(a), np.sin(h), np.cos(h) * np.cos(a)])
 
 
+def test_what_is_assigned_later_changes_the_light() -> None:
+    sky, after = (wf.Sky.cie(12, toward(height), horizontal=120, ground=0.4) for height in (30, 60))
+    after.sun = sky.sun
+    assert after.radiance(np.eye(3)).tolist() == sky.radiance(np.eye(3)).tolist() != []
+    after.horizontal = 240
+    np.testing.assert_allclose(after.radiance([(0, 1, 0)]), 2 * sky.radiance([(0, 1, 0)]), rtol=1e-6)
+    with pytest.raises(wf.SceneError, match="horizontal is 0"):
+        after.horizontal = 0
+    assert (after.horizontal == 240).all()
+
+
 @pytest.mark.parametrize("type", TYPES)
 def test_horizontal_irradiance_and_luminance_of_the_standard_skies(type: int) -> None:
     """By another quadrature, of the closed formula: irradiance within 0.1 %, luminance with it."""

@@ -1,5 +1,9 @@
 """Spot lights: the cone of glTF, and what a floor gets of it."""
 
+from collections.abc import Callable
+from functools import partial
+from typing import Any
+
 import numpy as np
 import pytest
 from hypothesis import given
@@ -92,6 +96,18 @@ def test_no_place_is_thought_darker_than_it_is(angle: float, blend: float, seed:
     assert (intensity / d**2 <= light.irradiance(center, radius, 9.0)[0, 0] * (1 + 1e-3) + 1e-6).all() or (
         np.linalg.norm(center) < radius
     )
+
+
+@pytest.mark.parametrize("make", [wf.SpotLight, partial(wf.Projector, picture=np.ones((2, 2, 3)))])
+def test_a_target_gives_the_direction_once(make: Callable[..., Any]) -> None:
+    light = make(position=(0, 4, 0), intensity=1, target=(0, 0, 0))
+    light.position = (3, 4, 0)
+    assert light.direction.tolist() == [0, -1, 0]
+    light.direction = (2, 0, 0)
+    assert light.direction.tolist() == [1, 0, 0]
+    with pytest.raises(wf.SceneError, match="needs a target or a direction, and not both"):
+        light.target = (0, 1, 0)
+    assert light.direction.tolist() == [1, 0, 0]
 
 
 def test_many_lights_of_all_kinds() -> None:

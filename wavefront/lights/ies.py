@@ -18,10 +18,10 @@ from ..core.errors import SceneError, number
 from ..core.files import path_name
 from ..core.parameter import Parameter
 from ..core.suggestions import suggests_keywords
-from ..film.aov_names import DEFAULT_GROUP
-from .base import DeltaLight, Emitters, LightSample
+from ..film.aov_names import DEFAULT_GROUP, group_name
+from .base import DeltaLight, Emitters, LightSample, position
 from .directional import unit
-from .point import LightAtPoint
+from .point import LightAtPoint, intensity_of
 from .spot import aim, sides_of
 
 NEAR = f4(1e-3)  # degrees beyond the last angle that rounding may give
@@ -182,6 +182,9 @@ class IESLight(LightAtPoint):
     """
 
     hint = "direct the IESLight"
+    position: Parameter[ArrayLike] = Parameter(position)
+    intensity: Parameter[ArrayLike] = Parameter(intensity_of)
+    group: Parameter[str] = Parameter(group_name)
     direction: Parameter[ArrayLike] = Parameter(unit)
     c0: Parameter[ArrayLike] = Parameter(unit)
 

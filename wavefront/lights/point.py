@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from copy import copy
-from typing import Self
+from typing import Any, Self
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -60,14 +60,12 @@ def intensity_of(name: str, value: ArrayLike) -> Doubles:
     return rgb(name, value, dtype=np.float64)
 
 
-@parametrized
 class LightAtPoint(Parametrized, Light):
-    """Base of lights at one position, with an intensity."""
+    """Base of lights at one position, with an intensity, which its subclasses declare."""
 
     delta = True
-    position: Parameter[ArrayLike] = Parameter(position)
-    intensity: Parameter[ArrayLike] = Parameter(intensity_of)
-    group: Parameter[str] = Parameter(group_name, default=DEFAULT_GROUP, kw_only=True)
+    position: Any
+    intensity: Any
 
     @property
     def bounds(self) -> Doubles:
@@ -88,6 +86,7 @@ class LightAtPoint(Parametrized, Light):
         return light
 
 
+@parametrized
 class PointLight(LightAtPoint):
     """A point light, which emits equally in all directions.
 
@@ -109,6 +108,10 @@ class PointLight(LightAtPoint):
     --------
     >>> lamp = wf.PointLight((0, 3, 0), intensity=(40, 35, 30))
     """
+
+    position: Parameter[ArrayLike] = Parameter(position)
+    intensity: Parameter[ArrayLike] = Parameter(intensity_of)
+    group: Parameter[str] = Parameter(group_name, default=DEFAULT_GROUP, kw_only=True)
 
     def record(self, center: Doubles) -> PointLightRecord:
         """Return the light as a record of one column, relative to `center` (3,)."""

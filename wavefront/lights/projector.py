@@ -10,19 +10,26 @@ from numpy.typing import ArrayLike
 from ..arrays.elementary import sin_cos
 from ..arrays.vec import Doubles, f4
 from ..core.errors import SceneError, number
-from ..core.parameter import Parameter
-from ..core.suggestions import suggests_keywords
-from ..film.aov_names import DEFAULT_GROUP
+from ..core.parameter import Parameter, optional, parametrized
+from ..film.aov_names import DEFAULT_GROUP, group_name
+from .base import position
 from .directional import unit
-from .point import LightAtPoint
-from .spot import PicturedLights, aim, picture_of, sides_of
+from .point import intensity_of
+from .spot import AimedLight, PicturedLights, picture_of, sides_of, target_of
+
+
+def _picture(name: str, value: Any) -> Any:
+    if value is None:
+        raise SceneError(f"{name} is None; it must be a Texture, a file or an array")
+    return picture_of(name, value)
 
 
 def _fov(name: str, value: float) -> float:
     return number(name, value, lambda x: 0 < x <= 170, "above 0 and at most 170 degrees")
 
 
-class Projector(LightAtPoint):
+@parametrized
+class Projector(AimedLight):
     """A projector: a point that throws a picture, as a `Camera` of the same view would see it.
 
     Parameters
@@ -55,33 +62,14 @@ class Projector(LightAtPoint):
     """
 
     hint = "direct the Projector, or widen its fov"
-    direction: Parameter[ArrayLike] = Parameter(unit)
-    picture: Parameter[Any] = Parameter(picture_of)
-    fov: Parameter[float] = Parameter(_fov)
-    up: Parameter[ArrayLike] = Parameter(unit)
-
-    @suggests_keywords
-    def __init__(
-        self,
-        position: ArrayLike,
-        picture: Any,
-        intensity: ArrayLike = 1.0,
-        *,
-        target: ArrayLike | None = None,
-        direction: ArrayLike | None = None,
-        fov: float = 45.0,
-        up: ArrayLike = (0, 1, 0),
-        group: str = DEFAULT_GROUP,
-    ) -> None:
-        self.position = position
-        self.picture = picture
-        if self.picture is None:
-            raise SceneError("Projector picture is None; it must be a Texture, a file or an array")
-        self.intensity = intensity
-        self.direction = aim("Projector", self.position, target, direction)
-        self.fov = fov
-        self.up = up
-        self.group = group
+    position: Parameter[ArrayLike] = Parameter(position)
+    picture: Parameter[Any] = Parameter(_picture)
+    intensity: Parameter[ArrayLike] = Parameter(intensity_of, default=1.0)
+    target: Parameter[ArrayLike | None] = Parameter(target_of, default=None, kw_only=True)
+    direction: Parameter[ArrayLike | None] = Parameter(optional(unit), default=None, kw_only=True)
+    fov: Parameter[float] = Parameter(_fov, default=45.0, kw_only=True)
+    up: Parameter[ArrayLike] = Parameter(unit, default=(0, 1, 0), kw_only=True)
+    group: Parameter[str] = Parameter(group_name, default=DEFAULT_GROUP, kw_only=True)
 
     def record(self, center: Doubles) -> PicturedLights:
         """Return the light as a record of one column, relative to `center` (3,)."""

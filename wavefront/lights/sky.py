@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from functools import partial
 from typing import ClassVar, Self
 
 import numpy as np
@@ -16,7 +17,7 @@ from ..arrays.vec import Doubles, Floats, column, dot, f4
 from ..camera import upward
 from ..colors import from_photometric, rgb
 from ..core.errors import SceneError, finite_array, number
-from ..core.parameter import Parameter, Parametrized
+from ..core.parameter import Parameter, Parametrized, brief, instance_of, optional, parametrized
 from ..film.aov_names import DEFAULT_GROUP, group_name
 from .base import Light, LightSample, Receiver
 from .directional import DirectionalLight, unit
@@ -77,6 +78,15 @@ def relative_radiance(function: SkyFunction, wi: Floats, height: Floats, sun: Fl
     return function.at(height, f4(2) * arcsin(np.minimum(half, f4(1))), f4(1) - f4(2) * half * half)
 
 
+def _zenith(name: str, up: ArrayLike) -> Doubles:
+    return unit(name, upward(name, up))
+
+
+def _irradiance(name: str, value: ArrayLike) -> Doubles:
+    return rgb(name, value).astype(float).ravel()
+
+
+@parametrized
 class Sky(Parametrized, Light):
     """The light of the sky and the sun; made by `Sky.cie`, `Sky.perez` or `Sky.hosek_wilkie`.
 
@@ -126,40 +136,34 @@ class Sky(Parametrized, Light):
     >>> scene = wf.Scene([wf.Sphere((0, 0, 0), 1)], [sky])
     """
 
-    group: Parameter[str] = Parameter(group_name)
+    model: Parameter[SkyFunction] = Parameter(instance_of(SkyFunction, "a SkyFunction"), alias="function")
+    sun: Parameter[ArrayLike] = Parameter(unit)
+    up: Parameter[ArrayLike] = Parameter(_zenith, default="y")
+    scale: Parameter[ArrayLike | None] = Parameter(optional(rgb), default=None, kw_only=True)
+    horizontal: Parameter[ArrayLike] = Parameter(rgb, default=1.0, kw_only=True)
+    direct_normal: Parameter[ArrayLike] = Parameter(_irradiance, default=0.0, kw_only=True)
+    ground: Parameter[ArrayLike] = Parameter(partial(rgb, high=1), default=0.2, kw_only=True)
+    group: Parameter[str] = Parameter(group_name, default=DEFAULT_GROUP, kw_only=True)
 
-    def __init__(
-        self,
-        function: SkyFunction,
-        sun: ArrayLike,
-        up: ArrayLike = "y",
-        *,
-        scale: ArrayLike | None = None,
-        horizontal: ArrayLike = 1.0,
-        direct_normal: ArrayLike = 0.0,
-        ground: ArrayLike = 0.2,
-        group: str = DEFAULT_GROUP,
-    ) -> None:
-        self.sun, self.up = unit("Sky sun", sun), _zenith(up)
-        self.group = group
+    def derive(self) -> None:
+        """Set the irradiance of the sky, and the light that is rendered."""
         rotation = _rotation(self.up)
-        relative = _table(function, rotation, self.sun)
-        level = _level_irradiance(relative)
-        if scale is None:
-            due = rgb("Sky horizontal", horizontal)
-            if not (due.any() and level.all()):
-                raise SceneError(f"Sky horizontal is {horizontal!r}; it and the model's must be above 0")
-            scale = (due / level).astype(f4)
-        self.direct_normal = rgb("Sky direct_normal", direct_normal).astype(float).ravel()
-        shade = np.asarray(scale, f4).reshape(-1, 1) * np.ones((3, 1), f4)
+        relative = _table(self.model, rotation, self.sun)
+        level, shade = _level_irradiance(relative), self.scale
+        if shade is None:
+            if not (self.horizontal.any() and level.all()):
+                raise SceneError(
+                    f"Sky horizontal is {brief(self.horizontal)}; it and the model's must be above 0"
+                )
+            shade = (self.horizontal / level).astype(f4)
         self.diffuse_horizontal = (shade * level).ravel()
         whole = self.diffuse_horizontal + self.direct_normal * max(float(self.sun @ self.up), 0.0)
-        below = (rgb("Sky ground", ground, high=1) * column(whole) / np.pi).astype(f4)
+        below = (self.ground * column(whole) / np.pi).astype(f4)
         pixels = np.empty((ROWS, COLUMNS, 3), f4)
         pixels[: ROWS // 2] = np.moveaxis(shade[:, :, None] * relative, 0, -1)
         pixels[ROWS // 2 :] = below.ravel()
         table = ImageEnvironment.of(pixels, "nearest", rotation)
-        self._light = SkyLight(function, shade, below, self.up.astype(f4), self.sun.astype(f4), table)
+        self._light = SkyLight(self.model, shade, below, self.up.astype(f4), self.sun.astype(f4), table)
 
     @classmethod
     def cie(
@@ -204,7 +208,7 @@ class Sky(Parametrized, Light):
             _height(sun, up)
         return cls(
             function,
-            _zenith(up) if sun is None else sun,
+            _zenith("Sky up", up) if sun is None else sun,
             up,
             horizontal=horizontal,
             direct_normal=direct_normal,
@@ -356,13 +360,9 @@ class Sky(Parametrized, Light):
         return EnvironmentSum.of([self._light, disk])
 
 
-def _zenith(up: ArrayLike) -> Doubles:
-    return unit("Sky up", upward("Sky up", up))
-
-
 def _height(sun: ArrayLike | None, up: ArrayLike) -> float:
     """Return the cosine of the sun's angle from the zenith, above 0."""
-    height = 0.0 if sun is None else float(unit("Sky sun", sun) @ _zenith(up))
+    height = 0.0 if sun is None else float(unit("Sky sun", sun) @ _zenith("Sky up", up))
     if not height > 0:
         raise SceneError(f"Sky sun is {sun!r}; such a sky needs one that is above the horizon")
     return min(height, 1.0)

@@ -12,14 +12,13 @@ from ..arrays.elementary import arccos, arcsin, sin_cos, sin_cos_turns
 from ..arrays.soa import soa
 from ..arrays.vec import Doubles, Floats, dot, f4, highest
 from ..core.errors import SceneError, finite_array, number, one_of
-from ..core.parameter import Parameter
-from ..core.suggestions import suggests_keywords
-from ..film.aov_names import DEFAULT_GROUP
+from ..core.parameter import Parameter, optional, parametrized
+from ..film.aov_names import DEFAULT_GROUP, group_name
 from ..textures.image import Texture
 from ..textures.parameter import check_limits
-from .base import DeltaLight, Emitters, LightSample
+from .base import DeltaLight, Emitters, LightSample, position
 from .directional import unit
-from .point import LightAtPoint
+from .point import LightAtPoint, intensity_of
 
 
 @soa
@@ -165,6 +164,20 @@ def aim(name: str, position: Any, target: ArrayLike | None, direction: ArrayLike
     return toward
 
 
+class AimedLight(LightAtPoint):
+    """Base of lights at one position that shine along a direction, which its subclasses declare."""
+
+    target: Any
+    direction: Any
+
+    def derive(self) -> None:
+        """Let a target give the direction, which then stays as it is."""
+        if self.target is not None or self.direction is None:
+            name = type(self).__name__
+            toward = aim(name, self.position, self.target, self.direction)
+            vars(self).update(direction=unit(f"{name} direction", toward), target=None)
+
+
 def sides_of(axis: Doubles, up: Doubles) -> tuple[Floats, Floats]:
     """Return unit vectors (3, 1) to the right and up, seen along an axis (3,); any where up is parallel."""
     right = np.cross(axis, up)
@@ -178,11 +191,16 @@ def _angle(name: str, value: float) -> float:
     return number(name, value, lambda x: 0 < x <= 180, "above 0 and at most 180 degrees")
 
 
+target_of = optional(position)
+_falloff = partial(one_of, choices=("smooth", "linear"))
+
+
 def _blend(name: str, value: float) -> float:
     return number(name, value, lambda x: 0 <= x <= 1, "in [0, 1]")
 
 
-class SpotLight(LightAtPoint):
+@parametrized
+class SpotLight(AimedLight):
     """A spot light: a point that emits into a cone.
 
     Parameters
@@ -222,37 +240,16 @@ class SpotLight(LightAtPoint):
     """
 
     hint = "direct the SpotLight, or widen its cone"
-    direction: Parameter[ArrayLike] = Parameter(unit)
-    angle: Parameter[float] = Parameter(_angle)
-    blend: Parameter[float] = Parameter(_blend)
-    falloff: Parameter[str] = Parameter(partial(one_of, choices=("smooth", "linear")))
-    picture: Parameter[Any] = Parameter(picture_of)
-    up: Parameter[ArrayLike] = Parameter(unit)
-
-    @suggests_keywords
-    def __init__(
-        self,
-        position: ArrayLike,
-        intensity: ArrayLike,
-        *,
-        target: ArrayLike | None = None,
-        direction: ArrayLike | None = None,
-        angle: float = 45.0,
-        blend: float = 0.15,
-        falloff: Literal["smooth", "linear"] = "smooth",
-        picture: Any = None,
-        up: ArrayLike = (0, 1, 0),
-        group: str = DEFAULT_GROUP,
-    ) -> None:
-        self.position = position
-        self.intensity = intensity
-        self.direction = aim("SpotLight", self.position, target, direction)
-        self.angle = angle
-        self.blend = blend
-        self.falloff = falloff
-        self.picture = picture
-        self.up = up
-        self.group = group
+    position: Parameter[ArrayLike] = Parameter(position)
+    intensity: Parameter[ArrayLike] = Parameter(intensity_of)
+    target: Parameter[ArrayLike | None] = Parameter(target_of, default=None, kw_only=True)
+    direction: Parameter[ArrayLike | None] = Parameter(optional(unit), default=None, kw_only=True)
+    angle: Parameter[float] = Parameter(_angle, default=45.0, kw_only=True)
+    blend: Parameter[float] = Parameter(_blend, default=0.15, kw_only=True)
+    falloff: Parameter[Literal["smooth", "linear"]] = Parameter(_falloff, default="smooth", kw_only=True)
+    picture: Parameter[Any] = Parameter(picture_of, default=None, kw_only=True)
+    up: Parameter[ArrayLike] = Parameter(unit, default=(0, 1, 0), kw_only=True)
+    group: Parameter[str] = Parameter(group_name, default=DEFAULT_GROUP, kw_only=True)
 
     def record(self, center: Doubles) -> SpotLights:
         """Return the light as a record of one column, relative to `center` (3,)."""
