@@ -9,6 +9,7 @@ from significance import ALPHA, assert_mean, assert_same_images, channels, rende
 
 import wavefront as wf
 from wavefront.colors.spectrum import blackbody_colors
+from wavefront.media.base import MediumRays
 from wavefront.media.grid import survivors
 from wavefront.media.voxels import Voxels, bounds_in_cells
 from wavefront.sampling.steps import StepNumbers
@@ -210,7 +211,8 @@ def flights(medium: wf.GridMedium, n: int, throughput=(1, 1, 1), **more):
     media = medium.record(np.zeros(3))
     length = np.full(n, np.inf, np.float32)
     throughput = np.repeat(np.float32(throughput)[:, None], n, 1)
-    return media.sample(np.zeros(n, np.intp), origin, direction, length, throughput, u, steps), throughput
+    rays = MediumRays(np.zeros(n, np.intp), origin, direction, length, steps)
+    return media.sample(rays, throughput, u), throughput
 
 
 @pytest.mark.parametrize("seed", [1, 2])

@@ -2,6 +2,7 @@
 
 import numpy as np
 
+from wavefront.media.base import MediumRays
 from wavefront.media.marching import March
 from wavefront.sampling.steps import StepNumbers
 
@@ -20,7 +21,8 @@ def marched(n: int, length: float, axis_aligned: bool = False):
     direction /= np.sqrt((direction**2).sum(0))
     steps = StepNumbers(np.zeros(n, np.uint64))
     far, never = np.full(n, length, np.float32), np.full(n, np.inf, np.float32)
-    march, control = March.of(number, origin, direction, far, CELLS, FIRST, never, steps), np.zeros(n)
+    rays = MediumRays(number, origin, direction, far, steps)
+    march, control = March.of(rays, CELLS, FIRST, never), np.zeros(n)
     while len(march):
         cell = march.cell
         lanes, inside = march.advance(np.zeros(len(march), np.float32), VALUES.take(cell, mode="wrap"))

@@ -9,6 +9,7 @@ from significance import assert_mean, assert_same_images, channels, measure, ren
 import wavefront as wf
 from wavefront.arrays.state import SurfaceInteraction
 from wavefront.compile.media import PhaseBsdf
+from wavefront.media.base import MediumRays
 
 ALL = ("naive", "direct_simple", "direct_mis", "full")
 FAR = wf.Sphere((0, 0, -1e4), 1, material=wf.Diffuse(0.0))  # a scene has a shape
@@ -111,7 +112,7 @@ def test_weights_of_distances(length: float, throughput) -> None:
     n = GRID.shape[1]
     zero, weight = np.zeros((3, n), np.float32), np.repeat(np.float32(throughput)[:, None], n, 1)
     far = np.full(n, length, np.float32)
-    flight = record.sample(np.zeros(n, int), zero, zero, far, weight, GRID, None)
+    flight = record.sample(MediumRays(np.zeros(n, int), zero, zero, far, None), weight, GRID)
     sigma_s, sigma = record.scattering.ravel(), record.extinction.ravel()
     met = np.isfinite(flight.t)
     t = (np.arange(200_000) + 0.5) * (min(length, 40) / 200_000)

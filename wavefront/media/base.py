@@ -28,6 +28,17 @@ from .phase import PhaseFunction
 
 
 @soa
+class MediumRays(SoA):
+    """Rays, each within one of the media of a record."""
+
+    number: Ints  # (n,) column of its medium
+    origin: Floats  # (3, n)
+    direction: Floats  # (3, n) unit
+    length: Floats  # (n,) how far it goes there, scene units, up to infinity
+    steps: StepNumbers | None  # numbers without end; None unless a record of the scene `takes_steps`
+
+
+@soa
 class Flight(SoA):
     """How far rays get in their media."""
 
@@ -73,27 +84,14 @@ class BaseMedium(Parametrized, ABC):
 
 
 class MediumRecord(SoA, ABC):
-    """The k media of one kind in a scene.
-
-    `number` (n,) is the column of each ray's medium, `origin` and `direction` (3, n) are the rays, and
-    `length` (n,) says how far they go in it, up to infinity. `steps` gives more random numbers, as many as
-    are needed; it is None unless a record of the scene `takes_steps`.
-    """
+    """The k media of one kind in a scene."""
 
     __slots__ = ()
     takes_steps: ClassVar[bool] = False
 
     @abstractmethod
     def sample(
-        self,
-        number: Ints,
-        origin: Floats,
-        direction: Floats,
-        length: Floats,
-        throughput: Floats,
-        u: Floats,
-        steps: StepNumbers | None,
-        weights: GlowWeights | None = None,
+        self, rays: MediumRays, throughput: Floats, u: Floats, weights: GlowWeights | None = None
     ) -> Flight:
         """Choose with u (2, n) where light is scattered.
 
@@ -103,14 +101,7 @@ class MediumRecord(SoA, ABC):
         """
 
     @abstractmethod
-    def transmittance(
-        self,
-        number: Ints,
-        origin: Floats,
-        direction: Floats,
-        length: Floats,
-        steps: StepNumbers | None,
-    ) -> Floats:
+    def transmittance(self, rays: MediumRays) -> Floats:
         """Return the part of the light that gets over the whole length, or an unbiased estimate, (3, n)."""
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from copy import copy
+from dataclasses import replace
 from typing import Any, Self
 
 import numpy as np
@@ -14,8 +15,7 @@ from ..arrays.vec import FLOAT32_MAX, TINY, Bools, Doubles, Floats, Ints, dot, f
 from ..colors.spectrum import blackbody_colors
 from ..core.errors import SceneError, as_array, finite_array, number
 from ..core.parameter import Parameter, optional, parametrized
-from ..sampling.steps import StepNumbers
-from .base import BaseMedium, Flight, GlowWeights, MediumRecord, channel_shares
+from .base import BaseMedium, Flight, GlowWeights, MediumRays, MediumRecord, channel_shares
 from .marching import March, optical_depth
 from .medium import _albedo, _coefficient, _scale
 from .phase import PhaseFunction, phase_or_isotropic
@@ -287,15 +287,7 @@ class GridMedia(MediumRecord):
     glows: Bools  # (k,)
 
     def sample(
-        self,
-        number: Ints,
-        origin: Floats,
-        direction: Floats,
-        length: Floats,
-        throughput: Floats,
-        u: Floats,
-        steps: StepNumbers | None,
-        weights: GlowWeights | None = None,
+        self, rays: MediumRays, throughput: Floats, u: Floats, weights: GlowWeights | None = None
     ) -> Flight:
         """Follow the rays from event to event of a rate that bounds the extinction (delta tracking).
 
@@ -305,16 +297,14 @@ class GridMedia(MediumRecord):
         Source: P. Kutz, R. Habel, Y. K. Li and J. Novák, "Spectral and Decomposition Tracking for Rendering
         Heterogeneous Volumes", ACM Transactions on Graphics 36(4), 2017, §4.
         """
-        assert steps is not None
-        distance, weight = np.full(number.size, np.inf, f4), np.ones_like(direction)
-        light = np.zeros_like(direction) if self.glows.any() else None
-        plain = np.flatnonzero(~(self.scatters | self.glows).take(number))
+        distance, weight = np.full(len(rays), np.inf, f4), np.ones_like(rays.direction)
+        light = np.zeros_like(rays.direction) if self.glows.any() else None
+        plain = np.flatnonzero(~(self.scatters | self.glows).take(rays.number))
         if plain.size:
-            rays = number.take(plain), take(origin, plain), take(direction, plain), length.take(plain)
-            weight[:, plain] = self.transmittance(*rays, steps.take(plain))
-            length = length.copy()
-            length[plain] = 0
-        march = self._march(number, origin, direction, length, optical_depth(u[0]), steps)
+            weight[:, plain] = self.transmittance(rays.take(plain))
+            rays = replace(rays, length=rays.length.copy())
+            rays.length[plain] = 0
+        march = self._march(rays, optical_depth(u[0]))
         step = 0
         while len(march):
             rate = self.bounds.values[1].take(march.cell, mode="wrap")
@@ -344,19 +334,18 @@ class GridMedia(MediumRecord):
             march, step = march if inside.all() else march.take(np.flatnonzero(inside)), step + 1
         return Flight(distance, weight, light)
 
-    def transmittance(
-        self, number: Ints, origin: Floats, direction: Floats, length: Floats, steps: StepNumbers | None
-    ) -> Floats:
+    def transmittance(self, rays: MediumRays) -> Floats:
         """Return an unbiased estimate of exp(−∫σt dt), (3, n), by residual ratio tracking.
 
         Source: J. Novák, A. Selle and W. Jarosz, "Residual Ratio Tracking for Estimating Attenuation in
         Participating Media", ACM Transactions on Graphics 33(6), 2014; with the least extinction of each
         cell as the control.
         """
-        assert steps is not None
-        part, control = np.ones_like(direction), np.zeros_like(length)
+        assert rays.steps is not None
+        part, control = np.ones_like(rays.direction), np.zeros_like(rays.length)
         strongest = np.maximum(highest(self.extinction), TINY)
-        march = self._march(number, origin, direction, length, optical_depth(steps.draw(0)), steps.again())
+        first = optical_depth(rays.steps.draw(0))
+        march = self._march(replace(rays, steps=rays.steps.again()), first)
         step = 0
         while len(march):
             low, high = take(self.bounds.values, march.cell)
@@ -376,27 +365,21 @@ class GridMedia(MediumRecord):
                 control[march.row.take(gone)] = march.control.take(gone)
                 march = march.take(np.flatnonzero(inside))
             step += 1
-        return part * exp(-control * take(self.extinction / strongest, number))
+        return part * exp(-control * take(self.extinction / strongest, rays.number))
 
     def emission(self, number: Ints, point: Floats, density: Floats) -> Floats:
         """Return what is emitted per scene unit, (3, n), at points (3, n) of the unit cube."""
         return take(self.shine, number) * density + self.glow.at(number, point)
 
-    def _march(
-        self,
-        number: Ints,
-        origin: Floats,
-        direction: Floats,
-        length: Floats,
-        left: Floats,
-        steps: StepNumbers,
-    ) -> March:
-        """Return the rays that meet boxes."""
-        matrix = take(self.to_unit, number)
-        x, y, z = matrix[0:3], matrix[3:6], matrix[6:9]
-        at, along = (np.stack([dot(row, vectors) for row in (x, y, z)]) for vectors in (origin, direction))
-        cells, first = self.bounds.size, self.bounds.first
-        return March.of(number, at + matrix[9:], along, length, cells, first, left, steps)
+    def _march(self, rays: MediumRays, left: Floats) -> March:
+        """Return the rays that meet boxes, with the optical depths (n,) up to their first events."""
+        matrix = take(self.to_unit, rays.number)
+        at, along = (
+            np.stack([dot(row, vectors) for row in (matrix[0:3], matrix[3:6], matrix[6:9])])
+            for vectors in (rays.origin, rays.direction)
+        )
+        inside = replace(rays, origin=at + matrix[9:], direction=along)
+        return March.of(inside, self.bounds.size, self.bounds.first, left)
 
 
 def survivors(part: Floats, u: Floats) -> Floats:

@@ -11,6 +11,7 @@ from ..arrays.soa import soa
 from ..arrays.state import SoA
 from ..arrays.vec import Bools, Floats, Ints, f4, highest, take
 from ..sampling.steps import StepNumbers
+from .base import MediumRays
 
 SMALL = f4(1e-25)  # in place of components of directions that are less, for divisions
 
@@ -38,40 +39,26 @@ class March(SoA):
     steps: StepNumbers
 
     @classmethod
-    def of(
-        cls,
-        number: Ints,
-        origin: Floats,
-        direction: Floats,
-        length: Floats,
-        cells: Ints,
-        first: Ints,
-        left: Floats,
-        steps: StepNumbers,
-    ) -> March:
+    def of(cls, rays: MediumRays, cells: Ints, first: Ints, left: Floats) -> March:
         """Return those of n rays that meet the unit cube.
 
         Parameters
         ----------
-        number
-            (n,) grid of each ray.
-        origin, direction
-            (3, n) in the unit cube, the direction per scene unit.
-        length
-            (n,) scene units.
+        rays
+            With origin and direction in the unit cube, the direction per scene unit.
         cells, first
             (3, k) along x, y and z, and (k,) the first cell of each grid.
         left
             (n,) optical depth up to the first event.
-        steps
-            Numbers for the steps.
         """
+        assert rays.steps is not None
+        origin, direction = rays.origin, rays.direction
         turned = np.where(np.abs(direction) < SMALL, np.where(direction < 0, -SMALL, SMALL), direction)
         one, other = -origin / turned, (f4(1) - origin) / turned
         near = np.maximum(highest(np.minimum(one, other)), f4(0))
-        far = np.minimum(-highest(-np.maximum(one, other)), length)
+        far = np.minimum(-highest(-np.maximum(one, other)), rays.length)
         row = np.flatnonzero(near < far)
-        number, turned, near = number.take(row), take(turned, row), near.take(row)
+        number, turned, near = rays.number.take(row), take(turned, row), near.take(row)
         start = np.minimum(np.maximum(take(origin, row) + turned * near, f4(0)), f4(1))
         along = take(cells, number)
         in_cells, forth = start * along.astype(f4), turned > 0
@@ -93,7 +80,7 @@ class March(SoA):
             cell=first.take(number) + offset,
             left=left.take(row),
             control=np.zeros_like(near),
-            steps=steps.take(row),
+            steps=rays.steps.take(row),
         )
 
     def advance(self, rate: Floats, sure: Floats | None = None) -> tuple[Ints, Bools]:

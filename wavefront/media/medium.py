@@ -11,13 +11,12 @@ from numpy.typing import ArrayLike
 
 from ..arrays.elementary import exp, log
 from ..arrays.soa import soa
-from ..arrays.vec import FLOAT32_MAX, Doubles, Floats, Ints, f4, highest, take
+from ..arrays.vec import FLOAT32_MAX, Doubles, Floats, f4, highest, take
 from ..colors import rgb
 from ..core.errors import SceneError, number
 from ..core.parameter import Parameter, optional, parametrized
-from ..sampling.steps import StepNumbers
 from ..textures.base import BaseTexture
-from .base import BaseMedium, Flight, GlowWeights, MediumRecord, channel_shares, chosen_channel
+from .base import BaseMedium, Flight, GlowWeights, MediumRays, MediumRecord, channel_shares, chosen_channel
 from .phase import PhaseFunction, phase_or_isotropic
 
 THIN = f4(0.05)  # optical depth below which 1 − exp(−x) is a series
@@ -133,45 +132,35 @@ class HomogeneousMedia(MediumRecord):
     glow: Floats  # (3, k)
 
     def sample(
-        self,
-        number: Ints,
-        origin: Floats,
-        direction: Floats,
-        length: Floats,
-        throughput: Floats,
-        u: Floats,
-        steps: StepNumbers | None,
-        weights: GlowWeights | None = None,
+        self, rays: MediumRays, throughput: Floats, u: Floats, weights: GlowWeights | None = None
     ) -> Flight:
         """Choose a channel with u[0] and a distance in it with u[1]; weigh by the densities of all channels.
 
         Sources: M. Pharr, W. Jakob and G. Humphreys, *Physically Based Rendering*, 3rd edition, §15.2.1 (the
         mean of the channels' densities); A. Wilkie et al., "Hero Wavelength Spectral Sampling", EGSR 2014.
         """
-        extinction, scattering = take(self.extinction, number), take(self.scattering, number)
+        extinction, scattering = (take(each, rays.number) for each in (self.extinction, self.scattering))
         shares = channel_shares(throughput)
         chosen = chosen_channel(extinction, shares, u[0])
         # where nothing is scattered, nothing is chosen either
         chosen *= highest(scattering) > 0
         some = chosen > 0
         t = np.where(some, -log(f4(1) - u[1]) / np.where(some, chosen, f4(1)), f4(np.inf))
-        met = t < length
-        through = transmitted(extinction, np.where(met, t, length))
+        met = t < rays.length
+        through = transmitted(extinction, np.where(met, t, rays.length))
         density = shares * through * np.where(met, extinction, f4(1))
         total = np.where(highest(scattering) > 0, density[0] + density[1] + density[2], f4(1))
         weight = through * np.where(met, scattering, f4(1)) / np.where(total > 0, total, f4(np.inf))
-        light = self._emitted(number, extinction, length) if self.glow.any() else None
+        light = self._emitted(rays, extinction) if self.glow.any() else None
         return Flight(np.where(met, t, f4(np.inf)), weight, light)
 
-    def transmittance(
-        self, number: Ints, origin: Floats, direction: Floats, length: Floats, steps: StepNumbers | None
-    ) -> Floats:
+    def transmittance(self, rays: MediumRays) -> Floats:
         """Return exp(−σt·length), (3, n)."""
-        return transmitted(take(self.extinction, number), length)
+        return transmitted(take(self.extinction, rays.number), rays.length)
 
-    def _emitted(self, number: Ints, extinction: Floats, length: Floats) -> Floats:
+    def _emitted(self, rays: MediumRays, extinction: Floats) -> Floats:
         """Return ε(1 − exp(−σt·length))/σt, (3, n): what is emitted on the way to the end of the rays."""
-        glow = take(self.glow, number)
+        glow, length = take(self.glow, rays.number), rays.length
         clear = extinction == 0
         depth = np.where(clear, f4(0), extinction * np.where(clear, f4(0), length))
         thin, low = depth < THIN, np.minimum(depth, THIN)

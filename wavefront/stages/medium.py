@@ -11,7 +11,7 @@ from ..arrays.state import Hits, Paths, Rays, SurfaceInteraction
 from ..arrays.vec import TINY, Bools, Floats, Ints, dot, f4, take
 from ..compile.media import crossed
 from ..compile.scene import CompiledScene
-from ..media.base import GlowWeights
+from ..media.base import GlowWeights, MediumRays
 from ..sampling.sampler import Dimension, Sampler
 from ..sampling.steps import StepNumbers
 
@@ -60,16 +60,9 @@ def fly(
     for record, rows, column in media.by_record(medium):
         at = some.take(rows)
         throughput, length = take(paths.throughput, at), take(hits.t, at)
-        flight = record.sample(
-            column,
-            take(paths.origin, at),
-            take(paths.direction, at),
-            length,
-            throughput,
-            take(u, rows),
-            None if steps is None else steps.take(rows),
-            _glow_weights(scene, paths, at, medium.take(rows)) if mis else None,
-        )
+        rays = _within(column, paths, at, length, None if steps is None else steps.take(rows))
+        weights = _glow_weights(scene, paths, at, medium.take(rows)) if mis else None
+        flight = record.sample(rays, throughput, take(u, rows), weights)
         if flight.light is not None and paths.glow is not None:
             paths.glow[:, at] += throughput * flight.light
         paths.throughput[:, at] = throughput * flight.weight
@@ -119,14 +112,14 @@ def transmitted(
     inside = np.flatnonzero(medium >= 0)
     for record, rows, column in media.by_record(medium.take(inside)):
         at = inside.take(rows)
-        part[:, at] = record.transmittance(
-            column,
-            take(rays.origin, at),
-            take(rays.direction, at),
-            length.take(at),
-            None if steps is None else steps.take(at),
-        )
+        some = None if steps is None else steps.take(at)
+        part[:, at] = record.transmittance(_within(column, rays, at, length.take(at), some))
     return part
+
+
+def _within(column: Ints, rays: Any, lanes: Ints, length: Floats, steps: StepNumbers | None) -> MediumRays:
+    """Return some lanes (k,) of rays or paths, with the columns of their media and the lengths (k,) there."""
+    return MediumRays(column, take(rays.origin, lanes), take(rays.direction, lanes), length, steps)
 
 
 def hidden(scene: CompiledScene, stack: Any, material: Ints) -> Bools:
