@@ -108,9 +108,10 @@ def _mask(node: Node, job: Job) -> Material:
     return job.changed(material, alpha=scalar(node, "opacity", 0.5, job))
 
 
-@plugin("null", "bsdf")
-def _null(node: Node, job: Job) -> Material:
-    return Material(Diffuse(0), alpha=0.0, name=node.id or None)
+plugin("null", "bsdf")(lambda node, job: Material(Diffuse(0), alpha=0.0, name=node.id or None))
+plugin("measured", "bsdf", "filename", note="spectra become RGB under D65")(
+    lambda node, job: _named(node, job.measured(node))
+)
 
 
 @plugin("blendbsdf", "bsdf", "weight", holds="bsdf texture")
@@ -134,11 +135,6 @@ def _bump(node: Node, job: Job) -> Material:
 @plugin("normalmap", "bsdf", f"normalmap {MAPPED}", holds="bsdf")
 def _normal(node: Node, job: Job) -> Material:
     return _mapped(node, job, ShadingFrameMap, None)
-
-
-@plugin("measured", "bsdf", "filename", note="spectra become RGB under D65")
-def _measured(node: Node, job: Job) -> Material:
-    return _named(node, job.measured(node))
 
 
 unsupported("circular hair measured_polarized polarizer pplastic retarder", "bsdf")

@@ -10,7 +10,7 @@ from ...camera import Sensors, SurfaceSensors
 from ...scene import Scene
 from ..repair import RawMesh
 from ..sources import SceneFiles
-from . import bsdfs, emitters, shapes, textures, volumes  # noqa: F401  they fill the table
+from . import bsdfs, emitters, shapes, textures  # noqa: F401  they fill the table
 from .media import medium_around
 from .nodes import Graph, Job, Node, plugin
 from .views import check_clipping, meter_on, sees_media

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from datetime import UTC, datetime, timedelta
-from typing import Any
 
 import numpy as np
 
@@ -24,10 +23,8 @@ PLACE, TIME = "latitude longitude timezone", "year month day hour minute second"
 LEAST_ROWS = 3  # of an environment map; one with fewer repeats its last
 
 
-@plugin("area", "emitter", "radiance")
-def _area(node: Node, job: Job) -> Any:
-    """Return the radiance, which a shape emits."""
-    return color(node, "radiance", 1.0, job, emission=True)
+# of an area light the radiance, which a shape emits
+plugin("area", "emitter", "radiance")(lambda node, job: color(node, "radiance", 1.0, job, emission=True))
 
 
 @plugin("point", "emitter", "position to_world intensity")
@@ -73,9 +70,7 @@ def _directional(node: Node, job: Job) -> DirectionalLight:
     )
 
 
-@plugin("constant", "emitter", "radiance")
-def _environment(node: Node, job: Job) -> Environment:
-    return Environment(_constant(node, "radiance", job))
+plugin("constant", "emitter", "radiance")(lambda node, job: Environment(_constant(node, "radiance", job)))
 
 
 @plugin("envmap", "emitter", "filename bitmap scale to_world", harmless="mis_compensation")

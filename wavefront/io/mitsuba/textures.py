@@ -7,6 +7,7 @@ flips it.
 from __future__ import annotations
 
 from copy import copy
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -107,10 +108,13 @@ def listed(node: Node, name: str) -> list[float]:
     return numbers("", name, value, range(1, MOST_VALUES))
 
 
-@plugin("rgb", "texture", "value")
-@plugin("spectrum irregular", "texture", "value filename wavelengths values")
-def _constant(node: Node, job: Job) -> Value:
-    return constant(node, job, emission=False, bounded=True)
+_plain = partial(constant, emission=False, bounded=True)
+plugin("rgb", "texture", "value")(_plain)
+plugin("spectrum irregular", "texture", "value filename wavelengths values")(_plain)
+plugin("blackbody", "texture", "temperature")(lambda node, job: blackbody(node.number("temperature", 5000.0)))
+plugin("mesh_attribute", "texture", "name scale", note="one for each shape, of ply files, in [0, 1]")(
+    lambda node, job: VertexColors(node.number("scale", 1.0))
+)
 
 
 @plugin("regular", "texture", "values wavelength_min wavelength_max")
@@ -138,11 +142,12 @@ def _srgb(node: Node, job: Job) -> Value:
     return base
 
 
-@plugin("blackbody", "texture", "temperature")
-def _blackbody(node: Node, job: Job) -> Value:
-    return blackbody(node.number("temperature", 5000.0))
-
-
+@plugin(
+    "bitmap",
+    "texture",
+    "filename bitmap data raw to_uv wrap_mode filter_type",
+    harmless="accel format",
+)
 def bitmap(node: Node, job: Job, channel: Any = None, plain: bool = False) -> Texture:
     """Return an image; `plain` for data that must be linear, such as heights."""
     job.check(node)
@@ -178,16 +183,6 @@ def upside_down(texture: Texture) -> Texture:
     return other
 
 
-@plugin(
-    "bitmap",
-    "texture",
-    "filename bitmap data raw to_uv wrap_mode filter_type",
-    harmless="accel format",
-)
-def _bitmap(node: Node, job: Job) -> Texture:
-    return bitmap(node, job)
-
-
 def pixels(node: Node, job: Job) -> NDArray[Any]:
     """Return the pixels of an image as stored, (H, W, C)."""
     for name in ("data", "bitmap"):
@@ -202,10 +197,6 @@ def pixels(node: Node, job: Job) -> NDArray[Any]:
 @plugin(
     "checkerboard", "texture", "color0 color1 to_uv", note="as a number the two change places, as in Mitsuba"
 )
-def _checkerboard(node: Node, job: Job) -> Texture:
-    return _board(node, job)
-
-
 def _board(node: Node, job: Job, channel: int | None = None) -> Texture:
     """Return four fields, of colors or of numbers; v from 0 to 1/2 is the upper row."""
     fields = []
@@ -219,11 +210,6 @@ def _board(node: Node, job: Job, channel: int | None = None) -> Texture:
     if channel is not None:  # `Checkerboard::eval_1` has color0 where `eval` has color1
         board = luminance(board[::-1].transpose(2, 0, 1))
     return Texture(board, filter="nearest", transform=_to_uv(node), channel=channel)
-
-
-@plugin("mesh_attribute", "texture", "name scale", note="one for each shape, of ply files, in [0, 1]")
-def _mesh_attribute(node: Node, job: Job) -> Value:
-    return VertexColors(node.number("scale", 1.0))
 
 
 unsupported("volume", "texture")

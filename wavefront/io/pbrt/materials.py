@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from copy import copy
 from typing import Any
 
@@ -10,6 +11,7 @@ import numpy as np
 from ...arrays.elementary import exp
 from ...arrays.vec import f4
 from ...bsdfs import (
+    Bsdf,
     Conductor,
     Dielectric,
     Diffuse,
@@ -78,13 +80,13 @@ def _made(entity: Entity, bsdf: Any, job: Job) -> Material:
     return Material(bsdf, normal_map=bumps, name=entity.name or None)
 
 
-@converts("material", "diffuse")
-def _diffuse(entity: Entity, job: Job) -> Material:
-    return _made(entity, Diffuse(_albedo(entity, "reflectance", 0.5, job)), job)
+def _surface(types: str) -> Callable[[Callable[[Entity, Job], Bsdf]], Any]:
+    """Put a function that returns the BSDF of materials into the table."""
+    return lambda make: converts("material", types)(lambda entity, job: _made(entity, make(entity, job), job))
 
 
-@converts("material", "coateddiffuse subsurface")
-def _coated_diffuse(entity: Entity, job: Job) -> Material:
+@_surface("coateddiffuse subsurface")
+def _coated_diffuse(entity: Entity, job: Job) -> Plastic:
     entity.harmless("maxdepth nsamples")
     below = entity.type == "subsurface"
     if below:
@@ -98,7 +100,7 @@ def _coated_diffuse(entity: Entity, job: Job) -> Material:
     base = _albedo(entity, "reflectance", 0.5, job)
     if thick:
         base = computed(_below_coat, base, *_coat(thick, ior))
-    return _made(entity, Plastic(base, ior=ior, nonlinear=True, multiscatter=False, **facets), job)
+    return Plastic(base, ior=ior, nonlinear=True, multiscatter=False, **facets)
 
 
 def _coat(thickness: float, ior: float) -> tuple[float, ...]:
@@ -130,14 +132,8 @@ def _layer(entity: Entity, job: Job) -> float:
     return max(thick, 0.0)
 
 
-@converts("material", "conductor")
-def _conductor(entity: Entity, job: Job) -> Material:
-    eta, k = _metal(entity, job, "")
-    return _made(entity, Conductor(eta, k, **_roughness(entity, job), multiscatter=False), job)
-
-
-@converts("material", "coatedconductor")
-def _coated_conductor(entity: Entity, job: Job) -> Material:
+@_surface("coatedconductor")
+def _coated_conductor(entity: Entity, job: Job) -> Principled:
     """Return a metal with a clear coat, which is as it would be in the coat."""
     entity.harmless("maxdepth nsamples")
     eta, k = _metal(entity, job, "conductor.")
@@ -146,10 +142,9 @@ def _coated_conductor(entity: Entity, job: Job) -> Material:
     ior = float(np.mean(_index(entity, "interface.eta", job)))
     entity.lose("the light between its layers; a metal with a clearcoat in its place")
     base = computed(_reflectance, eta, k, ior, rising=False)
-    bsdf = Principled(
+    return Principled(
         base, 1.0, clearcoat=1.0, clearcoat_roughness=coat["roughness"], **metal, multiscatter=False
     )
-    return _made(entity, bsdf, job)
 
 
 def _reflectance(eta: Any, k: Any, ior: Any = 1.0) -> Any:
@@ -176,27 +171,26 @@ def _metal(entity: Entity, job: Job, prefix: str) -> tuple[Value, Value]:
     return (eta if isinstance(eta, BaseTexture) else np.maximum(eta, LEAST_INDEX)), k
 
 
-@converts("material", "dielectric")
-def _dielectric(entity: Entity, job: Job) -> Material:
-    return _made(
-        entity, Dielectric(_index(entity, "eta", job), **_roughness(entity, job), multiscatter=False), job
-    )
+_surface("diffuse")(lambda entity, job: Diffuse(_albedo(entity, "reflectance", 0.5, job)))
+_surface("measured")(lambda entity, job: job.measured(entity))
+_surface("conductor")(
+    lambda entity, job: Conductor(*_metal(entity, job, ""), **_roughness(entity, job), multiscatter=False)
+)
+_surface("dielectric")(
+    lambda entity, job: Dielectric(_index(entity, "eta", job), **_roughness(entity, job), multiscatter=False)
+)
+_surface("thindielectric")(lambda entity, job: ThinDielectric(float(np.mean(_index(entity, "eta", job)))))
 
 
-@converts("material", "thindielectric")
-def _thin_dielectric(entity: Entity, job: Job) -> Material:
-    return _made(entity, ThinDielectric(float(np.mean(_index(entity, "eta", job)))), job)
-
-
-@converts("material", "diffusetransmission")
-def _diffuse_transmission(entity: Entity, job: Job) -> Material:
+@_surface("diffusetransmission")
+def _diffuse_transmission(entity: Entity, job: Job) -> DiffuseTransmission:
     factor = entity.number("scale", 1.0)
     sides = (_albedo(entity, name, 0.25, job, factor) for name in ("reflectance", "transmittance"))
-    return _made(entity, DiffuseTransmission(*sides), job)
+    return DiffuseTransmission(*sides)
 
 
-@converts("material", "mix")
-def _mix(entity: Entity, job: Job) -> Material:
+@_surface("mix")
+def _mix(entity: Entity, job: Job) -> Mix:
     names = entity.get("materials", ("string",)) or []
     if len(names) != 2:
         raise SceneError(f"materials names {len(names)} materials; it needs two")
@@ -205,19 +199,10 @@ def _mix(entity: Entity, job: Job) -> Material:
         raise SceneError("materials has an 'interface'; it cannot be mixed")
     if first.normal_map is not None or second.normal_map is not None:
         entity.lose("the bumps of its materials")
-    return _made(entity, Mix(first.bsdf, second.bsdf, scalar(entity, "amount", 0.5, job)), job)
+    return Mix(first.bsdf, second.bsdf, scalar(entity, "amount", 0.5, job))
 
 
-@converts("material", "interface none")
-def _interface(entity: Entity, job: Job) -> Material:
-    return Material(NullSurface(), name=entity.name or None)
-
-
-@converts("material", "measured")
-def _measured(entity: Entity, job: Job) -> Material:
-    return _made(entity, job.measured(entity), job)
-
-
+converts("material", "interface none")(lambda entity, job: Material(NullSurface(), name=entity.name or None))
 unsupported("material", "hair")
 
 

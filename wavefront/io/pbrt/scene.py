@@ -232,20 +232,17 @@ class Reader:
     def _Material(self, statement: Statement) -> None:
         self._set(material=self._entity("material", statement, "material", statement.words[0]))
 
-    def _MakeNamedMaterial(self, statement: Statement) -> None:
-        self._make(statement, "material")
-
-    def _MakeNamedMedium(self, statement: Statement) -> None:
-        self._make(statement, "medium")
-
-    def _make(self, statement: Statement, target: str) -> None:
+    def _make(self, statement: Statement) -> None:
         """Note a named material or medium, whose type is a parameter."""
+        target = statement.name.removeprefix("MakeNamed").lower()
         entity = self._entity(target, statement, target, "", statement.words[0])
         entity.type = entity.text("type", "")
         if not entity.type:
             raise SceneError(f"{statement.name} {entity.name!r} has no type")
         del entity.values["type"]
         self._name(target, entity.name, entity)
+
+    _MakeNamedMaterial = _MakeNamedMedium = _make
 
     def _NamedMaterial(self, statement: Statement) -> None:
         self._set(material=statement.words[0])

@@ -123,9 +123,7 @@ def part(entity: Entity, name: str, default: float, job: Job) -> Value:
     return color(entity, name, default, job, "unbounded")
 
 
-@converts("texture", "constant")
-def _constant(entity: Entity, job: Job) -> Value:
-    return part(entity, "value", 1.0, job)
+converts("texture", "constant")(lambda entity, job: part(entity, "value", 1.0, job))
 
 
 @converts("texture", "scale")

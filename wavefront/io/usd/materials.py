@@ -75,8 +75,7 @@ class Materials:
 
     def _value(self, shader: Any, name: str, default: Any, color: bool = False, normal: bool = False) -> Any:
         """Return an input: a float, a color as a tuple, or a texture."""
-        given = shader.GetInput(name)
-        sources = given.GetValueProducingAttributes() if given else []
+        sources = _sources(shader, name)
         if not sources:
             return default
         from pxr import UsdShade
@@ -118,8 +117,7 @@ class Materials:
         )
 
     def _get(self, source: Any, name: str, default: Any = None) -> Any:
-        given = source.GetInput(name)
-        sources = given.GetValueProducingAttributes() if given else []
+        sources = _sources(source, name)
         value = sources[0].Get(self.time) if sources else None
         return default if value is None else value
 
@@ -127,8 +125,7 @@ class Materials:
         """Return the matrix (3, 3) of a UsdTransform2d of texture coordinates, if there is one."""
         from pxr import UsdShade
 
-        given = source.GetInput("st")
-        sources = given.GetValueProducingAttributes() if given else []
+        sources = _sources(source, "st")
         reader = UsdShade.Shader(sources[0].GetPrim()) if sources else None
         if not reader or reader.GetIdAttr().Get() != "UsdTransform2d":
             return None
@@ -164,3 +161,9 @@ class Materials:
         folder = Path(os.fspath(self.files.scene)).resolve().parent
         path = self.files.find(os.path.relpath(name, folder) if os.path.isabs(name) else name)
         return self.files.image(path) if path.exists() else None
+
+
+def _sources(shader: Any, name: str) -> Any:
+    """Return the attributes that give the value of an input."""
+    given = shader.GetInput(name)
+    return given.GetValueProducingAttributes() if given else []
