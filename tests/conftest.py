@@ -1,11 +1,17 @@
 """Settings of the whole suite."""
 
+import errno
 import gc
 import os
+import pkgutil
 import signal
+import sys
+import time
 from collections import Counter
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import pytest
 from hypothesis import HealthCheck, Phase, settings
@@ -65,6 +71,116 @@ def pytest_collection_finish() -> None:
     """Leave the modules and tests out of what the garbage collector looks through during the tests."""
     gc.freeze()
     gc.enable()
+
+
+# --- What is watched, and what fails ---------------------------------------------------------------
+
+
+@dataclass
+class Call:
+    """One call of a function, and what it returned; None while it runs."""
+
+    args: tuple[Any, ...]
+    named: dict[str, Any]
+    result: Any = None
+
+
+@pytest.fixture
+def calls_of(monkeypatch: pytest.MonkeyPatch) -> Callable[..., list[Call]]:
+    """Return a function that notes the calls of another one, given by its name, for what shows nowhere else.
+
+    `instead` is called in its place.
+    """
+
+    def watch(name: str, instead: Callable[..., Any] | None = None) -> list[Call]:
+        calls: list[Call] = []
+        function = instead or pkgutil.resolve_name(name)
+
+        def noted(*args: Any, **named: Any) -> Any:
+            calls.append(call := Call(args, named))
+            call.result = function(*args, **named)
+            return call.result
+
+        monkeypatch.setattr(name, noted)
+        return calls
+
+    return watch
+
+
+@pytest.fixture
+def fails(calls_of: Callable[..., list[Call]]) -> Callable[..., list[Call]]:
+    """Return a function that has another one, given by its name, raise an error, always or `when` is true."""
+
+    def let_fail(name: str, error: BaseException, when: Callable[..., bool] | None = None) -> list[Call]:
+        function = pkgutil.resolve_name(name)
+
+        def failing(*args: Any, **named: Any) -> Any:
+            if when is None or when(*args, **named):
+                raise error
+            return function(*args, **named)
+
+        return calls_of(name, failing)
+
+    return let_fail
+
+
+@pytest.fixture
+def full_disk(fails: Callable[..., list[Call]]) -> Callable[[], object]:
+    """Return a function after which no file can be written to the end."""
+    return lambda: fails("os.fsync", OSError(errno.ENOSPC, "No space left on device"))
+
+
+@pytest.fixture
+def missing(monkeypatch: pytest.MonkeyPatch) -> Callable[..., None]:
+    """Return a function after which packages, given by their names, are not installed."""
+
+    def remove(*packages: str) -> None:
+        for package in packages:
+            for name in (package, *(each for each in sys.modules if each.startswith(f"{package}."))):
+                monkeypatch.setitem(sys.modules, name, None)
+
+    return remove
+
+
+@pytest.fixture
+def set_clock(monkeypatch: pytest.MonkeyPatch) -> Callable[[Callable[[], float]], None]:
+    """Return a function that sets the clock of renders."""
+    return lambda clock: monkeypatch.setattr(time, "perf_counter", clock)
+
+
+# --- What counts as long, large or many -------------------------------------------------------------
+
+
+@pytest.fixture
+def long_ago(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Let every render count as one that takes long, after which hints are shown."""
+    from wavefront.session import hints
+
+    monkeypatch.setattr(hints, "LONG", 0.0)
+
+
+@pytest.fixture
+def short_training(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Train guides with fewer paths, where they need not be good ones."""
+    from wavefront.integrators import training
+
+    monkeypatch.setattr(training, "PATHS", 1 << 12)
+
+
+@pytest.fixture
+def shared_instances(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Let instances share their mesh with Embree, too, however few triangles it has."""
+    from wavefront.accel import registry
+
+    monkeypatch.setattr(registry, "COPIES", 0)
+
+
+@pytest.fixture
+def tree_of_lights(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Choose lights by a tree, however few there are."""
+    from wavefront.lights import samplers
+
+    monkeypatch.setattr(samplers, "MOST_IN_GRID", 1)
 
 
 @pytest.fixture

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import gc
-import sys
 import tracemalloc
 from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
@@ -502,9 +501,8 @@ def test_names() -> None:
         make_accelerator(geometry(), "gpu")
 
 
-def test_embree_that_is_not_installed(monkeypatch: pytest.MonkeyPatch) -> None:
-    for module in ("embreex", "embreex.rtcore_scene", "embreex.mesh_construction"):
-        monkeypatch.setitem(sys.modules, module, None)
+def test_embree_that_is_not_installed(missing) -> None:
+    missing("embreex")
     assert make_accelerator(geometry(), "auto").name == "numpy"
     with pytest.raises(SceneError, match=r"pip install embreex"):
         make_accelerator(geometry(), "embree")

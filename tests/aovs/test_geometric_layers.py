@@ -7,7 +7,6 @@ from trimesh.ray.ray_triangle import RayMeshIntersector
 from trimesh.transformations import euler_matrix, translation_matrix
 
 import wavefront as wf
-from wavefront.accel import registry
 from wavefront.accel.embree import installed
 
 GEOMETRIC = (
@@ -179,11 +178,9 @@ def test_ids_of_overlapping_objects_are_those_of_trimesh(accel: str) -> None:
     assert image.names["shape"] == {at: f"object {at}" for at in range(8)}
 
 
-@pytest.mark.parametrize("shared", [True, False])
 @pytest.mark.parametrize("accel", ACCELERATORS)
-def test_instances_have_numbers_and_texture_coordinates_of_their_own(accel, shared, monkeypatch) -> None:
-    """Whether they share a mesh or were copied to meshes, between other shapes and mirrored."""
-    monkeypatch.setattr(registry, "COPIES", 0 if shared else 1 << 20)
+def test_instances_have_numbers_and_texture_coordinates_of_their_own(accel) -> None:
+    """Whether they share a mesh or, for Embree, were copied to meshes, between other shapes and mirrored."""
     square = wf.Mesh(
         [[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]],
         [[0, 1, 2], [0, 2, 3]],

@@ -6,7 +6,7 @@ import trimesh
 from trimesh.transformations import translation_matrix
 
 import wavefront as wf
-from wavefront.accel import registry
+from wavefront.accel.embree import installed
 
 CAMERA = wf.Camera.look_at((0, 1, 6), (0, 0, 0), fov=40, size=(60, 40))
 SKY = wf.Environment(1)
@@ -34,11 +34,13 @@ def extent(mask: np.ndarray) -> list[int] | None:
     return [int(columns.min()), int(rows.min()), int(columns.max()) + 1, int(rows.max()) + 1]
 
 
-@pytest.mark.parametrize("shared", [True, False])
-def test_boxes_are_those_of_the_objects_seen_and_of_each_alone(shared, monkeypatch) -> None:
-    monkeypatch.setattr(registry, "COPIES", 0 if shared else 1 << 20)
+@pytest.mark.parametrize(
+    "accel", ["numpy", pytest.param("embree", marks=pytest.mark.skipif(not installed(), reason="no embreex"))]
+)
+def test_boxes_are_those_of_the_objects_seen_and_of_each_alone(accel) -> None:
+    """Embree copies such small instances to meshes of their own."""
     shapes = objects()
-    image = wf.render(wf.Scene(shapes, [SKY], CAMERA), spp=1, aovs=("boxes", "shape_id"))
+    image = wf.render(wf.Scene(shapes, [SKY], CAMERA), spp=1, aovs=("boxes", "shape_id"), accel=accel)
     found = {box["shape"]: box for box in image.boxes}
     assert [found[number]["name"] for number in sorted(found)] == [shape.name for shape in shapes[:5]]
     for number, shape in enumerate(shapes[:5]):

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 import wavefront as wf
+from wavefront.accel.embree import installed
 
 CAMERA = wf.Camera.look_at((0, 4, 4), (0, 0, 0), fov=30, size=(24, 18))
 BLOCK = wf.Rectangle((-0.5, 0.6, -0.5), (0, 0, 1), (1, 0, 0), name="block")
@@ -69,11 +70,11 @@ def test_what_is_behind_a_catcher_is_seen_through_it() -> None:
     assert (wf.render(scene, spp=4).rgb == (0.25, 0.5, 0.75)).all()
 
 
-@pytest.mark.parametrize("shared", [True, False])
-def test_catchers_may_be_instances_with_a_material_of_their_own(shared, monkeypatch) -> None:
-    from wavefront.accel import registry
-
-    monkeypatch.setattr(registry, "COPIES", 0 if shared else 1 << 20)
+@pytest.mark.parametrize(
+    "accel", ["numpy", pytest.param("embree", marks=pytest.mark.skipif(not installed(), reason="no embreex"))]
+)
+def test_catchers_may_be_instances_with_a_material_of_their_own(accel) -> None:
+    """Embree copies such small instances to meshes of their own."""
     plain = floor(wf.Diffuse(0.5))
     lower = np.eye(4)
     lower[1, 3] = -1
@@ -82,9 +83,10 @@ def test_catchers_may_be_instances_with_a_material_of_their_own(shared, monkeypa
         wf.Instance(plain, lower, name="floor"),
     ]
     light = wf.DirectionalLight((0, -1, 0), 1)
-    image = wf.render(wf.Scene(shapes, light, CAMERA), spp=4, background="transparent")
+    settings = {"spp": 4, "background": "transparent", "accel": accel}
+    image = wf.render(wf.Scene(shapes, light, CAMERA), **settings)
     assert (image.alpha == 1).all()  # the floor below, which is dark under the catcher
-    only = wf.render(wf.Scene(shapes[:1], light, CAMERA), spp=4, background="transparent")
+    only = wf.render(wf.Scene(shapes[:1], light, CAMERA), **settings)
     assert (only.alpha == 0).all()
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import sys
+from collections.abc import Iterator
 from pathlib import Path
 from types import ModuleType, SimpleNamespace
 from typing import Any
@@ -96,14 +97,15 @@ class Map:
 
 
 @pytest.fixture
-def maps(monkeypatch: pytest.MonkeyPatch) -> Map:
+def maps(monkeypatch: pytest.MonkeyPatch) -> Iterator[Map]:
     """A stand-in for matplotlib, with one map."""
     module: Any = ModuleType("matplotlib")
     module.colormaps = {"three": Map()}
     monkeypatch.setitem(sys.modules, "matplotlib", module)
     monkeypatch.setitem(sys.modules, "matplotlib.colors", SimpleNamespace())
-    monkeypatch.setattr(colormaps, "_tables", colormaps._tables.__wrapped__)
-    return module.colormaps["three"]
+    colormaps._tables.cache_clear()
+    yield module.colormaps["three"]
+    colormaps._tables.cache_clear()
 
 
 def test_colors_of_a_colormap_give_a_hint(maps: Map) -> None:

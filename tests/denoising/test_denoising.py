@@ -71,22 +71,20 @@ def test_guides_help(denoiser) -> None:
     assert relative_mse(image.denoise(denoiser), exact) < 0.8 * relative_mse(alone, exact)
 
 
-def test_networks_of_open_image_denoise(monkeypatch) -> None:
+def test_networks_of_open_image_denoise(calls_of) -> None:
     """A picture of few samples takes one; others, and those whose samples are not known, clean guides."""
     pytest.importorskip("pyoidn")
-    run, taken = module._run, []
-    monkeypatch.setattr(
-        module, "_run", lambda *a, **k: (taken.append((*a[1], k.get("cleanAux"))), run(*a, **k))[1]
-    )
+    runs = calls_of("wavefront.denoising.open_image_denoise._run")
     guides = {f"denoising_{name}": np.full((64, 64, 3), 0.5, np.float32) for name in ("albedo", "normal")}
     whole = ("color", "albedo", "normal")
     for spp, clean in ((1, False), (module.FEW - 1, False), (module.FEW, True), (0, True)):
-        taken.clear()
+        runs.clear()
         wf.Image(np.full((64, 64, 3), 0.5, np.float32), spp, layers=guides).denoise("oidn")
+        taken = [(*run.args[1], run.named.get("cleanAux")) for run in runs]
         assert taken == [*([("albedo", None), ("normal", None)] if clean else []), (*whole, clean)]
-    taken.clear()
+    runs.clear()
     wf.Image(np.full((64, 64, 3), 0.5, np.float32), 64).denoise("oidn")
-    assert taken == [("color", False)]
+    assert [(*run.args[1], run.named["cleanAux"]) for run in runs] == [("color", False)]
 
 
 @pytest.mark.slow
@@ -185,12 +183,11 @@ def test_holes() -> None:
     assert without_holes(filled) is filled
 
 
-def test_without_pyoidn(monkeypatch) -> None:
+def test_without_pyoidn(missing) -> None:
     """The own filter takes over, and the error says how to install the other."""
     image, _ = scene_like((8, 8))
-    monkeypatch.setattr("wavefront.denoising.denoisers.find_spec", lambda name: None)
+    missing("pyoidn")
     assert image.denoise().metadata["denoiser"] == "nonlocal_means"
-    monkeypatch.setitem(sys.modules, "pyoidn", None)
     with pytest.raises(wf.SceneError, match="pip install pyoidn"):
         image.denoise("oidn")
     with pytest.raises(wf.SceneError, match="denoiser"):
@@ -202,10 +199,10 @@ def exact_box():
     return render(cornell_box(48), 256, seed=7, max_bounces=5)
 
 
-def test_render(denoiser, exact_box, monkeypatch) -> None:
+def test_render(denoiser, exact_box, missing) -> None:
     """Adds the guides, leaves the noisy picture as it would be, and lowers the error."""
     if denoiser != "oidn":
-        monkeypatch.setattr("wavefront.denoising.denoisers.find_spec", lambda name: None)
+        missing("pyoidn")
     scene = cornell_box(48)
     plain = render(scene, 16, aovs="depth", max_bounces=5)
     found = render(scene, 16, aovs="depth", max_bounces=5, denoise=True)

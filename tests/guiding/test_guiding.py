@@ -1,5 +1,8 @@
 """Path guiding: tables of directions, their mixture with BSDFs, and pictures that stay unbiased."""
 
+from collections.abc import Callable
+from typing import Any
+
 import numpy as np
 import pytest
 from hypothesis import given
@@ -14,10 +17,8 @@ from wavefront.arrays.vec import broadcast, f4
 from wavefront.guiding import GuideCells, GuideTable
 from wavefront.guiding.octahedral import bins_of, directions_at, neighbors, solid_angles
 from wavefront.guiding.training import SHARES, SIDE, Records, _best_shares, build_table
-from wavefront.integrators import training
 from wavefront.integrators.training import train
 from wavefront.sampling.sampler import Dimension
-from wavefront.session import choice
 from wavefront.stages.guidance import mix_with_guide
 from wavefront.stages.shade import Guidance, Shading
 
@@ -330,12 +331,6 @@ def test_guided_pictures_agree_with_plain_ones_and_have_less_noise() -> None:
     assert guided.metadata["noise"] < 0.7 * plain.metadata["noise"]
 
 
-@pytest.fixture
-def short_training(monkeypatch: pytest.MonkeyPatch) -> None:
-    """A guide of fewer paths, where it need not be a good one."""
-    monkeypatch.setattr(training, "PATHS", 1 << 13)
-
-
 @pytest.mark.usefixtures("short_training")
 def test_guided_pictures_do_not_depend_on_workers_or_waves() -> None:
     scene = lamp_at_the_ceiling()
@@ -366,7 +361,7 @@ def test_branches_can_be_guided() -> None:
     assert abs(plain.rgb.mean(dtype=float) - guided.rgb.mean(dtype=float)) < 4 * error
 
 
-def test_training_holds_blas_to_one_thread(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_training_holds_blas_to_one_thread(calls_of: Callable[..., Any]) -> None:
     """With more they wait for each other: on a busy machine the training took five times as long."""
     threads = []
 
@@ -375,7 +370,7 @@ def test_training_holds_blas_to_one_thread(monkeypatch: pytest.MonkeyPatch) -> N
         threads.extend(each["num_threads"] for each in libraries if each["user_api"] == "blas")
         return train(*arguments)
 
-    monkeypatch.setattr(choice, "train", spy)
+    calls_of("wavefront.session.choice.train", spy)
     wf.render([wf.Sphere((0, 0, 0), 1), wf.Environment(1)], 1, size=(8, 8), guide=True, progress=False)
     assert set(threads) == {1}
 

@@ -1,7 +1,5 @@
 """Comparison of pictures: numbers that can be worked out by hand, files, and complaints."""
 
-import sys
-
 import numpy as np
 import pytest
 
@@ -74,9 +72,9 @@ def test_flip_of_two_pngs_is_that_of_their_codes(tmp_path) -> None:
     assert f"{found.flip:.6g}" in str(found)
 
 
-def test_without_flip(monkeypatch) -> None:
+def test_without_flip(missing) -> None:
     """The reason stands where the number would."""
-    monkeypatch.setitem(sys.modules, "flip_evaluator", None)
+    missing("flip_evaluator")
     found = wf.compare(A, B)
     assert found.flip is None
     assert "pip install flip-evaluator" in str(found)

@@ -9,7 +9,6 @@ import hashlib
 import itertools
 import math
 import random
-import sys
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cache
@@ -25,7 +24,6 @@ from significance import assert_same_images, repeat
 
 import wavefront as wf
 from wavefront import cli
-from wavefront.accel.embree import installed
 from wavefront.arrays.vec import f4
 from wavefront.film.light_sums import LightSums
 from wavefront.lights.point import PointLightRecord
@@ -122,28 +120,20 @@ def test_light_tracing_changes_the_picture() -> None:
         assert digest(image)["standard_error"] != whole()["standard_error"]
 
 
-def test_no_bit_depends_on_embree_where_numpy_traces(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_no_bit_depends_on_embree_where_numpy_traces(missing: Callable[..., None]) -> None:
     expected = digest(wf.render(scene(), 8, **EVERY, accel="numpy"))
-    for module in ("embreex", "embreex.rtcore_scene", "embreex.mesh_construction"):
-        monkeypatch.setitem(sys.modules, module, None)
-    image = wf.render(scene(), 8, **EVERY, **({} if installed() else {"accel": "numpy"}))
+    missing("embreex")
+    image = wf.render(scene(), 8, **EVERY)
     assert image.metadata["accelerator"] == "numpy"
     assert digest(image) == expected
 
 
 @pytest.mark.parametrize("workers", [2, pytest.param(1, marks=pytest.mark.slow)])
-def test_no_bit_depends_on_a_lack_of_memory(workers: int, monkeypatch: pytest.MonkeyPatch) -> None:
-    trace, tried = tracing.trace_light, []
-
-    def limited(*given: Any) -> Any:
-        tried.append(given[3].size)
-        if given[3].size > 300:
-            raise MemoryError("no room")
-        return trace(*given)
-
-    monkeypatch.setattr(tracing, "trace_light", limited)
+def test_no_bit_depends_on_a_lack_of_memory(workers: int, fails: Callable[..., Any]) -> None:
+    lack = MemoryError("no room")
+    calls = fails("wavefront.scheduling.tracing.trace_light", lack, lambda *given: given[3].size > 300)
     image = wf.render(scene(), 8, **EVERY, workers=workers, executor="threads", wave_size=2000)
-    assert max(tried) > 300
+    assert max(call.args[3].size for call in calls) > 300
     assert digest(image) == whole()
 
 

@@ -9,7 +9,7 @@ import scenes
 from significance import Mean, assert_same_images, render, repeat
 
 import wavefront as wf
-from wavefront.integrators import ladder, steps, training
+from wavefront.integrators import steps
 from wavefront.sampling.sampler import Dimension, Sampler, make_sampler
 
 DIRECT_SPP = {"naive": 256, "direct_simple": 96, "direct_mis": 64, "full": 64}
@@ -129,7 +129,7 @@ class Once(Sampler):
         ("full", {"caustics": True}),
     ],
 )
-def test_no_number_is_used_twice(integrator, options, monkeypatch):
+def test_no_number_is_used_twice(integrator, options, short_training):
     """Not by two decisions, bounces or branches: the means of many scenes would not show it."""
     given: list[Once] = []
 
@@ -137,7 +137,6 @@ def test_no_number_is_used_twice(integrator, options, monkeypatch):
         given.append(Once("sobol", seed, width))
         return given[-1]
 
-    monkeypatch.setattr(training, "PATHS", 1 << 13)
     scene = scenes.everything((12, 9))
     veils = [
         wf.Rectangle((-2, -2, z), (4, 0, 0), (0, 4, 0), material=wf.Material(wf.Diffuse(0.5), alpha=0.3))
@@ -158,7 +157,7 @@ def test_no_number_is_used_twice(integrator, options, monkeypatch):
 
 
 @pytest.mark.parametrize("integrator", ["direct_simple", "direct_mis", "full"])
-def test_contributions_keep_the_number_of_their_light(monkeypatch, integrator: str) -> None:
+def test_contributions_keep_the_number_of_their_light(calls_of, integrator: str) -> None:
     """What is added to a picture, summed by light, is what each light brings alone."""
     lamp = wf.Rectangle((-1, 3, -1), (2, 0, 0), (0, 0, 2), material=wf.Diffuse(0), emission=(2, 0, 0))
     points = [wf.PointLight((0, 2, 1), (0, 5, 0)), wf.PointLight((1, 2, 0), (0, 0, 4))]
@@ -172,8 +171,8 @@ def test_contributions_keep_the_number_of_their_light(monkeypatch, integrator: s
         sums[:] += np.bincount(contribution.light, carried, 3)
         accumulate(L, paths, contribution)
 
-    for module in (ladder, steps):
-        monkeypatch.setattr(module, "accumulate", recorded)
+    for module in ("ladder", "steps"):
+        calls_of(f"wavefront.integrators.{module}.accumulate", recorded)
     image = render(wf.Scene([floor, lamp], points, camera), 16, integrator=integrator, executor="threads")
     found = sums / (16 * 8 * 6)
     assert found == pytest.approx(image.rgb.mean((0, 1)), rel=1e-4)  # each light has a channel of its own

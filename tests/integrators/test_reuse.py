@@ -9,7 +9,6 @@ from scipy import stats
 from significance import Mean, assert_mean, assert_same_images, render, repeat
 
 import wavefront as wf
-from wavefront.integrators import training
 from wavefront.sampling.tiles import PictureTiles, others_in_tile, place_in_tiles
 from wavefront.stages import reuse
 
@@ -188,8 +187,7 @@ def test_sharing_keeps_the_mean(build, spp, error, close_tiles):
     ],
     ids=str,
 )
-def test_branches_and_guides_go_with_it(options, close_tiles, monkeypatch):
-    monkeypatch.setattr(training, "PATHS", 1 << 13)
+def test_branches_and_guides_go_with_it(options, close_tiles, short_training):
     plain = repeat(scenes.room(), 32)
     shared = repeat(scenes.room(), 8, runs=10, reuse=True, first_seed=100, **options)
     assert_same_images(plain, shared, 0.01)
@@ -560,9 +558,8 @@ def caustic(size: int) -> wf.Scene:
         pytest.param(40, {"reuse": True, "guide": True}, id="guided", marks=pytest.mark.slow),
     ],
 )
-def test_errors_of_regions(runs: int, options: dict, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_errors_of_regions(runs: int, options: dict, short_training: None) -> None:
     """Intervals hold the converged mean as often as they say; stratified samples more often."""
-    monkeypatch.setattr(training, "PATHS", 1 << 12)
     scene = caustic(42) if "caustics" in options else below_the_lamp(42)
     images = [render(scene, 4, seed=seed, max_bounces=3, **options) for seed in range(runs)]
     found, error = coverage(images)

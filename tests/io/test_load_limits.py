@@ -7,6 +7,7 @@ import os
 import struct
 import time
 import zlib
+from collections.abc import Callable
 from dataclasses import fields
 from pathlib import Path
 from typing import Any
@@ -17,7 +18,7 @@ import trimesh
 
 import wavefront as wf
 from wavefront.codecs.images import write_image
-from wavefront.io import obj, sources
+from wavefront.io import obj
 from wavefront.io.load import load_meshes
 from wavefront.io.sources import SceneFiles
 
@@ -166,7 +167,7 @@ def test_limits_are_limits(scene: Path) -> None:
         wf.load(scene, limits=5)  # type: ignore[arg-type]
 
 
-def test_many_materials_are_few_meshes_for_trimesh(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_many_materials_are_few_meshes_for_trimesh(calls_of: Callable[..., Any]) -> None:
     """Its time grows with the square of their number. Each material gets its own faces."""
     rng = np.random.default_rng(7)
     points, texels = rng.random((300, 3)).round(6), rng.random((300, 2)).round(6)
@@ -180,11 +181,9 @@ def test_many_materials_are_few_meshes_for_trimesh(monkeypatch: pytest.MonkeyPat
         text += [f"usemtl m{number}", "f " + " ".join(f"{w}/{w}" if textured else w for w in words)]
         order = corners[[0, 1, 2]] if width == 3 else corners[[0, 1, 2, 2, 3, 0]]
         expected[f"m{number}"] = (order.tolist(), textured)
-    seen = []
-    whole = obj.geometries
-    monkeypatch.setattr(obj, "geometries", lambda *args: seen.append(whole(*args)) or seen[-1])
+    seen = calls_of("wavefront.io.obj.geometries")
     raws = obj.parse("a.obj", "\n".join(text)).raws
-    assert len(seen[0]) == 4
+    assert len(seen[0].result) == 4
     assert [raw.name for raw in raws] == list(expected)
     for raw in raws:
         order, textured = expected[raw.name]
@@ -249,7 +248,7 @@ def test_memory_of_pictures_is_checked_before_it_is_taken(tmp_path: Path) -> Non
 
 
 def test_images_of_a_scene_share_its_budget_and_are_read_once(
-    scene: Path, monkeypatch: pytest.MonkeyPatch
+    scene: Path, calls_of: Callable[..., Any]
 ) -> None:
     names = [scene.with_name(f"{letter}.png") for letter in "tu"]
     for name in names:
@@ -264,11 +263,9 @@ def test_images_of_a_scene_share_its_budget_and_are_read_once(
     message = rf"map_Kd: .*u\.png: .* takes 393216 bytes of memory, which makes {need} in all"
     with pytest.raises(wf.SceneError, match=message):
         wf.load(scene, limits=wf.LoadLimits(memory_bytes=need - allowed - 1))
-    read = []
-    whole = sources.read_codes
-    monkeypatch.setattr(sources, "read_codes", lambda path, budget: read.append(path) or whole(path, budget))
+    read = calls_of("wavefront.io.sources.read_codes")
     assert len(wf.load(scene, limits=wf.LoadLimits(memory_bytes=need - allowed)).shapes) == 8
-    assert read == names
+    assert [call.args[0] for call in read] == names
 
 
 def test_the_number_of_meshes_is_limited(tmp_path: Path) -> None:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import builtins
 import random
 import warnings
 from pathlib import Path
@@ -78,15 +77,8 @@ def rows(value: Any) -> Any:
     return np.asarray(value).ravel().tolist()
 
 
-def test_usd_core_that_is_missing_is_named(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    whole = builtins.__import__
-
-    def without(name: str, *rest: Any) -> Any:
-        if name == "pxr":
-            raise ImportError(name)
-        return whole(name, *rest)
-
-    monkeypatch.setattr(builtins, "__import__", without)
+def test_usd_core_that_is_missing_is_named(tmp_path: Path, missing: Any) -> None:
+    missing("pxr")
     with pytest.raises(wf.SceneError, match=r"scene\.usda: files of USD need usd-core: pip install usd-core"):
         load(tmp_path, MESH)
 

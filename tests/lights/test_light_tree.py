@@ -182,7 +182,7 @@ def test_a_tree_of_triangles_is_a_light() -> None:
     wf.testing.check_light(Dish(np.ones((1,), f4)), points=[[2, 1, 3]], samples=50_000)
 
 
-def test_pictures_have_the_mean_of_other_samplers(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_pictures_have_the_mean_of_other_samplers(tree_of_lights: None) -> None:
     """Points, a spot, triangles, a sphere and a sky: by the tree, and by power, the same within 3 sigma."""
     rng = np.random.default_rng(3)
     corner = rng.uniform((-2, 1, -2), (2, 3, 2), (30, 1, 3))
@@ -208,7 +208,6 @@ def test_pictures_have_the_mean_of_other_samplers(monkeypatch: pytest.MonkeyPatc
         return float(image.rgb.mean())
 
     by_power = np.array([mean("power", seed) for seed in range(8)])
-    monkeypatch.setattr(samplers, "MOST_IN_GRID", 1)
     by_tree = np.array([mean("spatial", seed) for seed in range(8)])
     sigma = np.hypot(by_power.std(ddof=1), by_tree.std(ddof=1)) / np.sqrt(8)
     assert sigma < 0.01 * by_power.mean()

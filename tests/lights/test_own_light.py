@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import wavefront as wf
-from wavefront.lights import LightTable, samplers
+from wavefront.lights import LightTable
 from wavefront.lights.tree import LightTreeSampler
 from wavefront.testing.chi2 import chi_square
 
@@ -137,9 +137,8 @@ class Nowhere(example("LineLight")):
     emitters = wf.LightRecord.emitters
 
 
-def test_the_tree_draws_lines_by_its_probabilities(monkeypatch):
+def test_the_tree_draws_lines_by_its_probabilities(tree_of_lights):
     """Those sum to 1, near lines are preferred, and counts of draws agree with them."""
-    monkeypatch.setattr(samplers, "MOST_IN_GRID", 100)
     lights = lines_under_a_ceiling(example("LineLight"))
     kind = type(lights[0]).concatenate(lights)
     choice, k, n = LightTable([kind], (4, 1, 4)).choice, len(kind), 1 << 16
@@ -156,8 +155,7 @@ def test_the_tree_draws_lines_by_its_probabilities(monkeypatch):
     assert p > 1e-3
 
 
-def test_lights_that_say_where_they_are_have_less_noise(monkeypatch):
-    monkeypatch.setattr(samplers, "MOST_IN_GRID", 100)
+def test_lights_that_say_where_they_are_have_less_noise(tree_of_lights):
     variances, means = [], []
     for kind in (example("LineLight"), Nowhere):
         scene = wf.Scene([floor()], [*lines_under_a_ceiling(kind), wf.Environment(0.01)], probe((1, 0, -2)))
@@ -179,14 +177,13 @@ def test_lights_that_say_where_they_are_have_less_noise(monkeypatch):
         (None, r"must return wf\.Emitters or None, got 3"),
     ],
 )
-def test_mistakes_of_places_are_named(monkeypatch, changes, message):
+def test_mistakes_of_places_are_named(tree_of_lights, changes, message):
     class Wrong(example("LineLight")):
         def emitters(self):
             return 3 if changes is None else replace(super().emitters().take(np.array([0])), **changes)
 
     with pytest.raises(wf.SceneError, match=f"Wrong: emitters.*{message}"):
         wf.testing.check_light(line(kind=Wrong), samples=20_000)
-    monkeypatch.setattr(samplers, "MOST_IN_GRID", 1)
     refused([floor()], [line(kind=Wrong), line()], f"Wrong: emitters.*{message}")
 
 

@@ -285,18 +285,16 @@ def test_only_the_light_of_the_scene_counts() -> None:
 # --- Many points --------------------------------------------------------------------------------------
 
 
-def test_more_points_than_a_row_has_pixels(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("wavefront.camera.sensors.MAX_SIDE", 8)
-    box, points = scenes.cornell_box(), np.random.default_rng(5).uniform(-0.9, 0.9, (21, 3))
-    found = wf.measure(box, points, (0, 0, 1), spp=8, **QUIET)
-    assert found.image.shape[:2] == (3, 7)
-    assert found.value.shape == (21, 3)
+def test_more_points_than_a_row_has_pixels() -> None:
+    """The last pixel of the last row stands for no point."""
+    n = 2**16 + 1
+    points = np.random.default_rng(5).uniform(-0.9, 0.9, (n, 3))
+    sky = wf.Scene([wf.Sphere((0, 0, -9), 1)], [wf.Environment((1, 2, 3))])
+    found = wf.measure(sky, points, (0, 0, 1), spp=1, **QUIET)
+    assert found.image.shape[:2] == (2, n // 2 + 1)
+    assert found.value.shape == (n, 3)
     assert (found.points == points).all()
-    monkeypatch.setattr("wavefront.camera.sensors.MAX_SIDE", 4)
-    assert wf.measure(box, points, (0, 0, 1), spp=8, **QUIET).image.shape[:2] == (6, 4)
-    few = wf.measure(box, points[:13], (0, 0, 1), spp=8, **QUIET)
-    assert few.image.shape[:2] == (4, 4)
-    assert few.value.shape == (13, 3)
+    assert found.value == pytest.approx(np.tile(found.value[:1], (n, 1)))
 
 
 def test_large_units_and_places_change_nothing() -> None:

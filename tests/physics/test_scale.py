@@ -8,7 +8,6 @@ import numpy as np
 import pytest
 
 import wavefront as wf
-from wavefront.accel import registry as choose
 from wavefront.compile.scale import MAX_RADIUS, MIN_RADIUS, length_factor, scaled_shapes
 
 SIDE = 12
@@ -65,10 +64,9 @@ def picture(scene: wf.Scene, accel: str) -> np.ndarray:
 
 
 @pytest.fixture(params=["numpy", "embree"])
-def accel(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> str:
+def accel(request: pytest.FixtureRequest, shared_instances: None) -> str:
     if request.param == "embree":
         pytest.importorskip("embreex")
-        monkeypatch.setattr(choose, "COPIES", 0)  # or else small instances become meshes of their own
     return str(request.param)
 
 

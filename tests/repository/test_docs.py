@@ -12,7 +12,6 @@ import numpy as np
 import pytest
 
 import wavefront as wf
-from wavefront.integrators import training
 
 ROOT = Path(__file__).parents[2]
 PAGES = sorted([*(ROOT / "docs").glob("*.md"), *(ROOT / "docs" / "how_to").glob("*.md")])
@@ -34,7 +33,7 @@ def blocks():
 
 
 @pytest.fixture
-def few_samples(tmp_path, monkeypatch):
+def few_samples(tmp_path, monkeypatch, short_training):
     """Let renders take one sample of each of few pixels, and guides learn little, in an empty folder."""
     render, render_many = wf.render, wf.render_many
 
@@ -49,7 +48,6 @@ def few_samples(tmp_path, monkeypatch):
 
     monkeypatch.setattr(wf, "render", quick)
     monkeypatch.setattr(wf, "render_many", quick_many)
-    monkeypatch.setattr(training, "PATHS", 1 << 13)
     monkeypatch.chdir(tmp_path)
 
 

@@ -74,8 +74,8 @@ def test_wrong_input(library, arguments: dict, said: str) -> None:
         wf.sun_position("2026-06-21", **{"latitude": 48, "longitude": 11, **arguments})
 
 
-def test_without_the_library(monkeypatch) -> None:
-    monkeypatch.setitem(sys.modules, "pvlib.solarposition", None)
+def test_without_the_library(missing) -> None:
+    missing("pvlib")
     with pytest.raises(ImportError, match="pip install pvlib"):
         wf.sun_position("2026-06-21", 48, 11)
 

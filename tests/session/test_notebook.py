@@ -16,7 +16,6 @@ import pytest
 
 import wavefront as wf
 from wavefront.material_ball import ball_png
-from wavefront.session import hints
 from wavefront.session import notebook as module
 from wavefront.session.notebook import in_kernel, run_shown, shows_pictures
 
@@ -83,10 +82,8 @@ def test_a_material_shows_a_ball_of_it() -> None:
         assert "reflectance=(0.8, 0.1, 0.1)" in html
 
 
-def test_a_ball_is_rendered_again_only_when_its_material_changed(monkeypatch: pytest.MonkeyPatch) -> None:
-    calls: list[Any] = []
-    ball = sys.modules["wavefront.material_ball"]
-    monkeypatch.setattr(ball, "_rendered", lambda material: calls.append(material) or b"png")
+def test_a_ball_is_rendered_again_only_when_its_material_changed(calls_of: Any) -> None:
+    calls = calls_of("wavefront.material_ball._rendered", lambda material: b"png")
     paint = wf.Diffuse(0.25)
     assert ball_png(paint) == ball_png(paint) == b"png"
     assert len(calls) == 1
@@ -169,26 +166,28 @@ def test_a_render_in_a_kernel_shows_better_and_better_pictures(kernel: Any) -> N
     assert shown == []
 
 
-def test_the_first_pictures_are_denoised(kernel: Any, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Where that is quick; the last one is as it was rendered, and a denoiser that fails is left out."""
-    _, shown = kernel
-    monkeypatch.setattr("wavefront.denoising.is_quick", lambda: False)
+def test_pictures_are_not_denoised_where_that_is_slow(kernel: Any, missing: Any) -> None:
+    missing("pyoidn")
     wf.render(BALL, 16, size=(16, 16))
-    assert not any("denoiser" in each.metadata for each in shown)
-    shown.clear()
-    monkeypatch.setattr("wavefront.denoising.is_quick", lambda: True)
+    assert not any("denoiser" in each.metadata for each in kernel[1])
+
+
+def test_the_first_pictures_are_denoised(kernel: Any, fails: Any, monkeypatch: pytest.MonkeyPatch) -> None:
+    """The last one is as it was rendered; large ones, and a denoiser that fails, are left out."""
+    pytest.importorskip("pyoidn")
+    _, shown = kernel
     wf.render(BALL, 16, size=(16, 16))
     assert ["denoiser" in each.metadata for each in shown] == [True] * 4 + [False]
     shown.clear()
     few = wf.render(BALL, 4, size=(16, 16))
     assert shown[-1] is few
     assert "denoiser" not in few.metadata
-    monkeypatch.setattr(module, "MOST_CLEANED", 16 * 16 - 1)
-    shown.clear()
-    wf.render(BALL, 4, size=(16, 16))
-    assert not any("denoiser" in each.metadata for each in shown)
     monkeypatch.setattr(module, "MOST_CLEANED", 16 * 16)
-    monkeypatch.setattr(wf.Image, "denoise", lambda image: 1 / 0)
+    for width, height, cleaned in ((16, 16, True), (16, 17, False)):
+        shown.clear()
+        wf.render(BALL, 4, size=(width, height))
+        assert any("denoiser" in each.metadata for each in shown) is cleaned
+    fails("wavefront.Image.denoise", ZeroDivisionError())
     shown.clear()
     wf.render(BALL, 4, size=(16, 16))
     assert [each.spp for each in shown] == [1, 2, 4]
@@ -225,8 +224,7 @@ def test_an_interrupt_keeps_the_picture(kernel: Any) -> None:
     assert shown[-1] is stop.value.image
 
 
-def test_a_long_render_ends_with_hints(kernel: Any, monkeypatch: Any, capsys: Any) -> None:
-    monkeypatch.setattr(hints, "LONG", 0.0)
+def test_a_long_render_ends_with_hints(kernel: Any, long_ago: None, capsys: Any) -> None:
     ball = wf.Sphere((0, 0, 0), 1, material=wf.Dielectric(1.5))
     wf.render(
         [ball, wf.Rectangle((-9, -1, 9), (18, 0, 0), (0, 0, -18)), wf.PointLight((0, 3, 0), 9)],

@@ -14,7 +14,6 @@ import pytest
 from scenes import cornell_box
 
 import wavefront as wf
-from wavefront.integrators import training
 from wavefront.integrators.tuning import Run, Trial
 from wavefront.sampling import tiles
 from wavefront.session import choice
@@ -160,10 +159,9 @@ def test_auto_leaves_re_use_out(each: Exclusion, monkeypatch: pytest.MonkeyPatch
     ids=["quick", "slow"],
 )
 def test_every_other_pair_renders(
-    names: Sequence[str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    names: Sequence[str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch, short_training: None
 ) -> None:
     """Of the settings that the table has but for guides, which take longer; or of all: a minute."""
-    monkeypatch.setattr(training, "PATHS", 1 << 8)
     monkeypatch.chdir(tmp_path)
     scene = glass_on_a_floor()
     for number, pair in enumerate(pairs(names)):

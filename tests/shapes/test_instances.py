@@ -15,7 +15,6 @@ from trimesh.transformations import euler_matrix, translation_matrix
 import wavefront as wf
 from wavefront.accel import InstanceAccelerator, Intersections, make_accelerator
 from wavefront.accel import instances as queries
-from wavefront.accel import registry as choose
 from wavefront.accel.embree import installed
 from wavefront.arrays.state import Rays
 from wavefront.arrays.vec import dot
@@ -31,10 +30,7 @@ SKY = [wf.Environment(1)]
 RED, BLUE = wf.Diffuse((0.8, 0.2, 0.1)), wf.Conductor.named("gold", roughness=0.4)
 
 
-@pytest.fixture(autouse=True)
-def share_all(monkeypatch):
-    """Share even what is small."""
-    monkeypatch.setattr(choose, "COPIES", 0)
+pytestmark = pytest.mark.usefixtures("shared_instances")
 
 
 def bumpy(smooth: bool = False, **more) -> wf.Mesh:

@@ -9,7 +9,6 @@ import wavefront as wf
 from wavefront.film.film import Film
 from wavefront.film.picture_sums import PictureSums
 from wavefront.film.samples import shared_samples
-from wavefront.image import comparison as metrics
 from wavefront.image.image import film_image
 from wavefront.statistics.significance import sidak
 from wavefront.statistics.student_t import log_gamma, t_tail
@@ -80,9 +79,9 @@ def test_correction() -> None:
 
 
 @pytest.fixture(autouse=True)
-def _without_flip(monkeypatch) -> None:
+def _without_flip(missing) -> None:
     """It takes longer than the tests."""
-    monkeypatch.setattr(metrics, "_flip", lambda *_: (None, ""))
+    missing("flip_evaluator")
 
 
 @pytest.mark.parametrize("draw", [gaussian, heavy, fireflies, flashes, edges])
