@@ -52,14 +52,15 @@ class EmbreeAccelerator:
             ids = that_can_be_hit(triangles)
         self._ids = np.append(ids, -1)  # (k + 1,) ids by Embree's primitive; the last one is for misses
         self._scene: Any = None
+        self._overlapping: OverlappingFaces | None = None
         if ids.size:
             self._scene = EmbreeScene(robust=True)
             TriangleMesh(self._scene, triangles if ids.size == len(triangles) else triangles.take(ids, 0))
             rays = np.zeros((1, 3), f4)
             self._scene.run(rays, rays + f4(1))  # build now, not in the first of many threads
-        self._planes = TrianglePlanes(triangles)
-        overlaps = find_overlaps(triangles, ids, self._planes.plane)
-        self._overlapping = None if overlaps is None else OverlappingFaces(geometry, overlaps)
+            self._planes = TrianglePlanes(triangles)
+            overlaps = find_overlaps(triangles, ids, self._planes.plane)
+            self._overlapping = None if overlaps is None else OverlappingFaces(geometry, overlaps)
         self._curved: NumpyAccelerator | None = None
         if any(map(len, geometry.curved)):
             self._first_curved = len(triangles)

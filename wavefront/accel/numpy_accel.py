@@ -53,14 +53,17 @@ class NumpyAccelerator:
         self._first_curved = len(triangles)
         self._weights = geometry.weights
         self._ball = _ball_of(geometry)
+        self._triangles: BruteForceTriangles | PrimitiveTree | None = None
         with np.errstate(all="ignore"):
-            self._table = triangle.triangle_table(triangles, self._weights)
-            self._triangles = self._search_triangles(geometry, leaf_size)
+            if len(triangles):
+                self._table = triangle.triangle_table(triangles, self._weights)
+                self._triangles = self._search_triangles(geometry, leaf_size)
             first, self._curved = self._first_curved, []
             for kind in geometry.curved:
                 self._curved.append(self._search_curved(kind, first, leaf_size))
                 first += len(kind)
-        trees = self._triangles.tree, *(search.tree for search in self._curved)
+        searches = [self._triangles, *self._curved]
+        trees = [search.tree for search in searches if search is not None]
         self._batch = _batch_size(sum(len(tree.leaves) for tree in trees if tree))
 
     def _search_triangles(
@@ -90,7 +93,8 @@ class NumpyAccelerator:
             with np.errstate(all="ignore"):
                 batch = prepare(origin[:, part], direction[:, part], exclude_prim[part], self._ball)
                 found = ClosestHit(batch, self._ball)
-                self._triangles.find_hits(batch, found)
+                if self._triangles is not None:
+                    self._triangles.find_hits(batch, found)
                 for curved in self._curved:
                     curved.find_hits(batch, found)
                 self._unpack(batch, found.packed, hits, part)
@@ -106,7 +110,8 @@ class NumpyAccelerator:
             with np.errstate(all="ignore"):
                 batch = prepare(*rays, self._ball, distance[part])
                 found = AnyHit(batch, self._ball, distance[part])
-                self._triangles.find_blocked(batch, found)
+                if self._triangles is not None:
+                    self._triangles.find_blocked(batch, found)
                 for curved in self._curved:
                     curved.find_hits(batch, found)
             blocked[part] = found.blocked
@@ -115,11 +120,14 @@ class NumpyAccelerator:
     def _unpack(self, batch: RayBatch, packed: Codes, hits: Intersections, part: slice) -> None:
         """Write packed hits (n,), and barycentrics of triangles, to the slice `part` of `hits`."""
         hits.t[part] = t = unpack_t(packed)
-        hits.prim[part] = prim = self._triangles.resolve_quads(unpack_prim(packed), batch, t)
+        prim = unpack_prim(packed)
+        if self._triangles is not None:
+            prim = self._triangles.resolve_quads(prim, batch, t)
+        hits.prim[part] = prim
         b1, b2 = hits.b1[part], hits.b2[part]
         b1[...] = 0
         b2[...] = 0
-        if not self._weights:
+        if not self._weights or self._triangles is None:
             return
         on = np.flatnonzero((prim >= 0) & (prim < self._first_curved))
         everywhere = on.size == packed.size

@@ -21,7 +21,7 @@ from ..core.suggestions import suggests_keywords
 from ..film.aov_names import DEFAULT_GROUP, group_name
 from .base import DeltaLight, Emitters, LightSample, position
 from .directional import unit
-from .point import LightAtPoint, intensity_of
+from .point import LightAtPoint, intensity_of, toward
 from .spot import aim, sides_of
 
 NEAR = f4(1e-3)  # degrees beyond the last angle that rounding may give
@@ -92,15 +92,10 @@ class IESLights(DeltaLight):
 
     def sample_li(self, point: Floats, u: Floats) -> LightSample:
         """Return the direction to the light; radiance is I/d² with the intensity I in that direction."""
-        away = self.position - point
-        d2 = dot(away, away)
-        apart = d2 > 0
-        safe = np.where(apart, d2, f4(1))
-        distance = np.sqrt(safe)
-        wi = away / distance
+        wi, distance, d2, apart = toward(self.position, point)
         candela = self.web.candela(*(-dot(axis, wi) for axis in (self.along, self.zero, self.quarter)))
         pdf = np.where(apart & (candela > 0), f4(1), f4(0))
-        return LightSample(wi, self.intensity * (candela / safe), pdf, distance, np.ones_like(distance))
+        return LightSample(wi, self.intensity * (candela / d2), pdf, distance, np.ones_like(distance))
 
     def power(self, scene_radius: float) -> Doubles:
         """Return the integral of the intensity over all directions."""

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..arrays.soa import soa
-from ..arrays.vec import FLOAT32_MAX, Doubles, Floats, dot, f4
+from ..arrays.vec import FLOAT32_MAX, Bools, Doubles, Floats, dot, f4
 from ..colors import rgb
 from ..core.errors import SceneError, as_array, finite_array
 from ..core.parameter import Parameter, Parametrized, parametrized
@@ -26,13 +26,9 @@ class PointLightRecord(DeltaLight):
 
     def sample_li(self, point: Floats, u: Floats) -> LightSample:
         """Return the direction to the light; radiance is I/d²."""
-        away = self.position - point
-        d2 = dot(away, away)
-        lit = d2 > 0
-        safe = np.where(lit, d2, f4(1))
-        distance = np.sqrt(safe)
-        pdf = np.where(lit, f4(1), f4(0))
-        return LightSample(away / distance, self.intensity / safe, pdf, distance, np.ones_like(distance))
+        wi, distance, d2, apart = toward(self.position, point)
+        pdf = np.where(apart, f4(1), f4(0))
+        return LightSample(wi, self.intensity / d2, pdf, distance, np.ones_like(distance))
 
     def power(self, scene_radius: float) -> Doubles:
         """4πI."""
@@ -47,6 +43,19 @@ class PointLightRecord(DeltaLight):
         """Return the positions; the lights shine everywhere."""
         middle = self.position.astype(np.float64)
         return Emitters(middle, np.zeros_like(middle), np.zeros(len(self)))
+
+
+def toward(position: Floats, point: Floats) -> tuple[Floats, Floats, Floats, Bools]:
+    """Return the directions (3, n) from points to positions, the distances d, d², and whether d is above 0.
+
+    Where it is not, d² and d are 1.
+    """
+    away = position - point
+    d2 = dot(away, away)
+    apart = d2 > 0
+    safe = np.where(apart, d2, f4(1))
+    distance = np.sqrt(safe)
+    return away / distance, distance, safe, apart
 
 
 def intensity_of(name: str, value: ArrayLike) -> Doubles:

@@ -18,7 +18,7 @@ from ..textures.image import Texture
 from ..textures.parameter import check_limits
 from .base import DeltaLight, Emitters, LightSample, position
 from .directional import unit
-from .point import LightAtPoint, intensity_of
+from .point import LightAtPoint, intensity_of, toward
 
 
 @soa
@@ -35,15 +35,10 @@ class SpotLights(DeltaLight):
 
     def sample_li(self, point: Floats, u: Floats) -> LightSample:
         """Return the direction to the light; radiance is I·falloff/d²."""
-        away = self.position - point
-        d2 = dot(away, away)
-        apart = d2 > 0
-        safe = np.where(apart, d2, f4(1))
-        distance = np.sqrt(safe)
-        wi = away / distance
+        wi, distance, d2, apart = toward(self.position, point)
         strength = self._falloff(wi)
         pdf = np.where(apart & (strength > 0), f4(1), f4(0))
-        return LightSample(wi, self.intensity * (strength / safe), pdf, distance, np.ones_like(distance))
+        return LightSample(wi, self.intensity * (strength / d2), pdf, distance, np.ones_like(distance))
 
     def power(self, scene_radius: float) -> Doubles:
         """2πI·(h_inner + (h_outer − h_inner)/3), the integral of the falloff; h = 1 − cos.

@@ -28,11 +28,10 @@ from .dask import DaskClient, dask_workers, threads_in
 from .remote import RemoteWorkers
 from .workers import (
     ExecutorMaker,
+    ExecutorTasks,
     LocalWorkers,
-    OwnExecutor,
     StoppableWork,
     TaskPool,
-    UsersExecutor,
     Workers,
     WorkersMaker,
     shares_memory,
@@ -73,13 +72,13 @@ def _spawn(method: str, work: StoppableWork, count: int, strict: bool) -> Worker
 def _threads(work: StoppableWork, count: int, strict: bool) -> Workers:
     reserve_buffers(count)
     executor = ThreadPoolExecutor(count, thread_name_prefix="wavefront")
-    return LocalWorkers(OwnExecutor(executor, work.stop), work)
+    return LocalWorkers(ExecutorTasks(executor, work.stop, replaceable=True), work)
 
 
 def _made(make: ExecutorMaker, work: StoppableWork, count: int, strict: bool) -> Workers:
     """Start the workers of an executor that is made for them."""
     executor = make(count)
-    pool = OwnExecutor(executor, work.stop)
+    pool = ExecutorTasks(executor, work.stop, replaceable=True)
     try:
         return _workers_of(executor, pool, work, strict)
     except BaseException:
@@ -89,7 +88,7 @@ def _made(make: ExecutorMaker, work: StoppableWork, count: int, strict: bool) ->
 
 def _users(executor: Executor, work: StoppableWork, count: int, strict: bool) -> Workers:
     """Use the workers of an executor that belongs to the caller."""
-    return _workers_of(executor, UsersExecutor(executor, work.stop), work, strict)
+    return _workers_of(executor, ExecutorTasks(executor, work.stop, replaceable=False), work, strict)
 
 
 def _workers_of(executor: Executor, pool: TaskPool, work: StoppableWork, strict: bool) -> Workers:

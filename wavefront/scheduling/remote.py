@@ -14,7 +14,7 @@ from typing import Any, Protocol
 from ..core.errors import RenderError, warn_caller
 from .machine import describe_machine
 from .payload import Payload, Reply, do_job, pack
-from .workers import JobFailed, StoppableWork, TaskPool, WarningsOfJobs, submit_to
+from .workers import JobFailed, StoppableWork, TaskPool, WarningsOfJobs
 
 
 class Delivery(Protocol):
@@ -85,7 +85,7 @@ class RemoteWorkers:
     def submit(self, job: Any, attempt: int = 0) -> Future[Any]:
         """Give a job to the first worker that is free."""
         reference = self._delivery.again(self._payload) if attempt else self._reference
-        return submit_to(self._pool, do_job, reference, job)
+        return self._pool.submit(do_job, reference, job)
 
     def result(self, future: Future[Any]) -> Any:
         """Return the result of a job that is done.

@@ -55,7 +55,7 @@ class TaskPool(Protocol):
     replaceable: bool
 
     def submit(self, function: Callable[..., Any], /, *args: Any) -> Future[Any]:
-        """Have the first worker that is free call a function."""
+        """Have the first worker that is free call a function; if all are lost, the future says so."""
 
     def shutdown(self, running: Collection[Future[Any]]) -> None:
         """End all workers that are ours."""
@@ -107,7 +107,7 @@ class LocalWorkers:
 
     def submit(self, job: Any, attempt: int = 0) -> Future[Any]:
         """Give a job to the first worker that is free."""
-        return submit_to(self._pool, with_warnings, self._work, job)
+        return self._pool.submit(with_warnings, self._work, job)
 
     def result(self, future: Future[Any]) -> Any:
         """Return the result of a job that is done; an error is raised as it is."""
@@ -120,48 +120,33 @@ class LocalWorkers:
         self._pool.shutdown(running)
 
 
-class OwnExecutor:
-    """An executor that was made for a render, and ends with it."""
+class ExecutorTasks:
+    """Runs functions in the workers of an executor, which ends with the render if it was made for it.
 
-    replaceable = True
+    One that belongs to the caller goes on.
+    """
 
-    def __init__(self, executor: Executor, stop: SharedInt) -> None:
-        self._executor, self._stop = executor, stop
-
-    def submit(self, function: Callable[..., Any], /, *args: Any) -> Future[Any]:
-        """Have the first worker that is free call a function."""
-        return self._executor.submit(function, *args)
-
-    def shutdown(self, running: Collection[Future[Any]]) -> None:
-        """Wait for the workers, which check the stop flag; after a second Ctrl-C do not wait."""
-        self._executor.shutdown(wait=all_done(running, math.inf, self._stop))
-
-
-class UsersExecutor:
-    """An executor that belongs to the caller, and goes on after the render."""
-
-    replaceable = False
-
-    def __init__(self, executor: Executor, stop: SharedInt) -> None:
-        self._executor, self._stop = executor, stop
+    def __init__(self, executor: Executor, stop: SharedInt, replaceable: bool) -> None:
+        self._executor, self._stop, self.replaceable = executor, stop, replaceable
 
     def submit(self, function: Callable[..., Any], /, *args: Any) -> Future[Any]:
-        """Have the first worker that is free call a function."""
-        return self._executor.submit(function, *args)
+        """Have the first worker that is free call a function; if all are lost, the future says so."""
+        try:
+            return self._executor.submit(function, *args)
+        except BrokenExecutor as error:
+            failed: Future[Any] = Future()
+            failed.set_exception(error)
+            return failed
 
     def shutdown(self, running: Collection[Future[Any]]) -> None:
-        """Withdraw jobs that have not begun, and wait a moment for the others."""
-        all_done(running, END_TIMEOUT, self._stop)
+        """Withdraw jobs that have not begun, and wait for the others; for those of a caller a moment.
 
-
-def submit_to(pool: TaskPool, function: Callable[..., Any], *args: Any) -> Future[Any]:
-    """Have a worker call a function; if the pool has lost its workers, the future says so."""
-    try:
-        return pool.submit(function, *args)
-    except BrokenExecutor as error:
-        failed: Future[Any] = Future()
-        failed.set_exception(error)
-        return failed
+        After a second Ctrl-C nobody waits.
+        """
+        if self.replaceable:
+            self._executor.shutdown(wait=all_done(running, math.inf, self._stop))
+        else:
+            all_done(running, END_TIMEOUT, self._stop)
 
 
 def shares_memory(executor: Executor, stop: SharedInt) -> bool:

@@ -27,8 +27,10 @@ def guide(shade: Shading, table: GuideTable | None) -> Shading:
     Surfaces that only have delta lobes cannot be guided, and transmissive ones are not: their light comes
     from two sides.
     """
+    if table is None:
+        return shade
     lit = shade.lit()
-    if table is None or not lit.groups:
+    if not lit.groups:
         return shade
     row = table.rows(lit.surface.point, lit.surface.ns)
     share = table.share.take(row)
