@@ -42,6 +42,7 @@ from ..statistics.scatter import PREFIX as SCATTER
 from .outlines import outline_coverage
 
 FIELDS = ("counts", "variance", "standard_error")  # arrays (H, W, ...) besides rgb, layers and errors
+PARTS = ("rgb", "spp", "metadata", *FIELDS, "layers", "errors", "names", "sums", "scatter")
 
 
 class Image:
@@ -389,17 +390,13 @@ class Image:
         def scaled(arrays: Mapping[str, NDArray[Any]], by: NDArray[np.float32]) -> dict[str, NDArray[Any]]:
             return {name: array * by if is_radiance(name) else array for name, array in arrays.items()}
 
-        return Image(
-            self.rgb * scale,
-            self.spp,
-            self.metadata,
-            counts=self.counts,
+        return self._with(
+            rgb=self.rgb * scale,
             variance=None if self.variance is None else self.variance * size**2,
             standard_error=None if self.standard_error is None else self.standard_error * size,
             layers=scaled(self.layers, scale),
             errors=scaled(self.errors, size),
-            names=self.names,
-            scatter=self.scatter,
+            sums=None,
         )
 
     __rmul__ = __mul__
@@ -430,17 +427,12 @@ class Image:
         picture = noisy_picture(source.rgb, source.standard_error, source.layers, source.errors, source.spp)
         rgb, used = denoise(picture, denoiser)
         error = {} if source.standard_error is None else {NOISY: source.standard_error}
-        return Image(
-            rgb,
-            source.spp,
-            {**source.metadata, "denoiser": used},
-            counts=source.counts,
-            variance=source.variance,
+        return source._with(
+            rgb=rgb,
+            metadata={**source.metadata, "denoiser": used},
+            standard_error=None,
             layers={**source.layers, NOISY: source.rgb},
             errors={**source.errors, **error},
-            names=source.names,
-            sums=source.sums,
-            scatter=source.scatter,
         )
 
     @property
@@ -448,19 +440,17 @@ class Image:
         """The picture before denoising; None if this one was not denoised."""
         if NOISY not in self.layers:
             return None
-        return Image(
-            self.layers[NOISY],
-            self.spp,
-            {name: value for name, value in self.metadata.items() if name != "denoiser"},
-            counts=self.counts,
-            variance=self.variance,
+        return self._with(
+            rgb=self.layers[NOISY],
+            metadata={name: value for name, value in self.metadata.items() if name != "denoiser"},
             standard_error=self.errors.get(NOISY),
             layers={name: layer for name, layer in self.layers.items() if name != NOISY},
             errors={name: error for name, error in self.errors.items() if name != NOISY},
-            names=self.names,
-            sums=self.sums,
-            scatter=self.scatter,
         )
+
+    def _with(self, **parts: Any) -> Image:
+        """Return the picture with other parts."""
+        return Image(**{name: vars(self)[name] for name in PARTS} | parts)
 
     def merge(self, other: Image) -> Image:
         """Merge two pictures of one scene that have different samples.
@@ -583,17 +573,12 @@ class Image:
         layers = dict(self.layers)
         if "alpha" in layers:
             layers["alpha"] = layers["alpha"] * (1 - covered) + covered
-        return Image(
-            np.asarray(self.rgb * left + ink * covered[..., None], np.float32),
-            self.spp,
-            self.metadata,
-            counts=self.counts,
+        return self._with(
+            rgb=np.asarray(self.rgb * left + ink * covered[..., None], np.float32),
             variance=None if self.variance is None else self.variance * left**2,
             standard_error=None if self.standard_error is None else self.standard_error * left,
             layers=layers,
-            errors=self.errors,
-            names=self.names,
-            scatter=self.scatter,
+            sums=None,
         )
 
     def to_uint8(
