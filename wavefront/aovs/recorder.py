@@ -12,7 +12,7 @@ import numpy as np
 
 from ..arrays.soa import soa
 from ..arrays.state import BounceDepth, Contribution, Hits, Paths
-from ..arrays.vec import Bools, Bytes, Floats, Ints, broadcast, f4, put, take
+from ..arrays.vec import Bools, Bytes, Floats, Ints, add_to_slots, broadcast, f4, put, take
 from ..compile.light_groups import PATCHED, LightGroups
 from ..compile.scene import CompiledScene
 from ..core.errors import SceneError
@@ -368,9 +368,3 @@ def _is_direct(depth: Bytes, contribution: Contribution) -> Bools:
     """Return a mask (k,) of the contributions that count for the AOV "direct"."""
     at = take(depth, contribution.lanes)
     return at == BounceDepth.CAMERA if contribution.sampled else at <= BounceDepth.DIRECT
-
-
-def add_to_slots(rows: Floats, slot: Ints, values: Floats) -> None:
-    """Add values (3, k) to the slots (k,), in which numbers may repeat, of rows (3, n)."""
-    for row, channel in zip(rows, values, strict=True):  # a row at a time: much faster
-        np.add.at(row, slot, channel)

@@ -7,10 +7,9 @@ from typing import TypeAlias
 
 import numpy as np
 
-from ..aovs.recorder import add_to_slots
 from ..arrays.soa import soa
 from ..arrays.state import Hits, Paths
-from ..arrays.vec import Floats, f4, highest
+from ..arrays.vec import Floats, add_to_slots, f4, highest
 from ..compile.scene import CompiledScene
 from ..guiding import GuideTable
 from ..sampling.sampler import Sampler

@@ -8,9 +8,8 @@ from dataclasses import replace
 import numpy as np
 
 from ..aovs.path_recorder import MetSurfaces
-from ..aovs.recorder import add_to_slots
 from ..arrays.state import Contribution, Hits, Paths
-from ..arrays.vec import Floats, Ints, highest, take
+from ..arrays.vec import Floats, Ints, add_to_slots, highest, take
 from ..compile.scene import CompiledScene
 from ..sampling.sampler import Sampler
 from ..stages.alpha import alpha_pass_through

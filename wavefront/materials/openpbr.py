@@ -111,18 +111,13 @@ class OpenPBR(Material):
         name: str | None = None,
     ) -> None:
         given = locals()
-        depth = number(
-            "OpenPBR transmission_depth", transmission_depth, lambda x: 0 <= x < np.inf, "at least 0"
-        )
+        depth = _amount("transmission_depth", transmission_depth)
         interior = None
         if depth > 0 and not geometry_thin_walled:
             given["transmission_color"] = 1.0
             interior = _interior(
                 transmission_color, depth, transmission_scatter, transmission_scatter_anisotropy
             )
-        luminance = number(
-            "OpenPBR emission_luminance", emission_luminance, lambda x: 0 <= x < np.inf, "at least 0"
-        )
         if isinstance(subsurface_weight, BaseTexture) or subsurface_weight > 0:
             warn_caller("OpenPBR: subsurface scattering is approximated by a diffuse surface of its color")
         super().__init__(
