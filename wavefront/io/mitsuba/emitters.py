@@ -94,7 +94,7 @@ def _sun_and_sky(node: Node, job: Job) -> list[Light]:
     """Return the sky, whose zenith is z, and the disk of the sun."""
     up, sun = node.matrix()[:3, 2], _direction_of_sun(node)
     albedo = _constant(node, "albedo", job, 0.3)
-    factors = {"sky": node.number("sky_scale", 1.0), "sun": node.number("sun_scale", 1.0)}
+    of_sky, of_sun = node.number("sky_scale", 1.0), node.number("sun_scale", 1.0)
     if node.flag("complex_sun"):
         node.lose("complex_sun")
 
@@ -103,11 +103,11 @@ def _sun_and_sky(node: Node, job: Job) -> list[Light]:
         turbidity = node.number("turbidity", 3.0)
         return Sky.hosek_wilkie(turbidity, albedo, sun, up, scale=scale, disk=disk, ground=0.0)
 
-    found: list[Light] = [sky(factors["sky"], disk=False)] if factors["sky"] else []
-    if factors["sun"]:
+    found: list[Light] = [sky(of_sky, disk=False)] if of_sky else []
+    if of_sun:
         aperture = node.number("sun_aperture", 0.5358)
         rim = float(sin_cos(np.float64(np.radians(aperture) / 2))[1])
-        power = sky(factors["sun"], disk=True).direct_normal * (1 + rim) / 2  # the mean cosine on the disk
+        power = sky(of_sun, disk=True).direct_normal * (1 + rim) / 2  # the mean cosine on the disk
         found.append(DirectionalLight(-sun, power, angle=aperture))
     return found
 

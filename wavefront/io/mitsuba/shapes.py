@@ -85,8 +85,8 @@ def _cylinder(node: Node, job: Job) -> list[Shape]:
     even = abs(around[1] - around[0]) <= ROUND * around[0]
     if even and not needs_faces and not textures_in(material, Texture):
         ends = np.stack([start, end]) @ matrix[:3, :3].T + matrix[:3, 3]
-        pipe = Cylinders(ends[:1], ends[1:], radius * around[0], caps=False, material=material)
-        return [_named(pipe, node)]
+        size, name = radius * around[0], node.id or "cylinders"
+        return [Cylinders(ends[:1], ends[1:], size, caps=False, material=material, name=name)]
     ring, turns = _ring(1.0)
     across = ring @ axes[:, :2].T
     vertices = np.concatenate([start + radius * across, end + radius * across])
@@ -125,8 +125,8 @@ def _sphere(node: Node, job: Job) -> list[Shape]:
         if np.linalg.det(turn) < 0:
             node.lose("the reflection of its textures")
             turn = -turn
-    ball = Sphere(center, radius, material=material, emission=emission, transform=turn)
-    return [_named(ball, node)]
+    name = node.id or "sphere"
+    return [Sphere(center, radius, material=material, emission=emission, transform=turn, name=name)]
 
 
 @plugin("obj ply", "shape", f"{SURFACE} filename face_normals flip_tex_coords", PARTS)
@@ -246,12 +246,6 @@ def _box(matrix: Matrix) -> tuple[Doubles, Doubles]:
     """Return the lower and the upper corner of a cube from -1 to 1 that a matrix placed."""
     reach = np.abs(matrix[:3, :3]).sum(1)
     return matrix[:3, 3] - reach, matrix[:3, 3] + reach
-
-
-def _named(shape: Any, node: Node) -> Any:
-    if node.id:
-        shape.name = node.id
-    return shape
 
 
 def _for_spheres(material: Material, emission: Any, job: Job) -> tuple[Material, Any]:

@@ -115,13 +115,8 @@ class Reader:
 
     def _entity(self, kind: str, statement: Statement, target: str, type: str, name: str = "") -> Entity:
         given = self.state.defaults.get(target, {}) | statement.parameters
-        return Entity(
-            kind, type, statement.place, given, self.job.lost, self._matrix(), self.state, name=name
-        )
-
-    def _matrix(self) -> Matrix:
-        matrix: Matrix = self.state.matrices[0]
-        return matrix
+        matrix = self.state.matrices[0]
+        return Entity(kind, type, statement.place, given, self.job.lost, matrix, self.state, name=name)
 
     def _still(self, entity: Entity) -> Entity:
         """Note if something moves while the shutter is open."""
@@ -279,7 +274,7 @@ class Reader:
             raise SceneError("ObjectInstance is inside an object")
         if name not in self.objects:
             raise SceneError(f"there is no object {name!r}")
-        self.uses.setdefault(name, []).append(self._matrix())
+        self.uses.setdefault(name, []).append(self.state.matrices[0])
 
 
 def read_scene(
