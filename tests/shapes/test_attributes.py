@@ -176,3 +176,4 @@ def test_a_texture_of_colors_serves_as_a_number():
 
 class _Surface:
     uv = np.random.default_rng(4).random((2, 5)).astype(np.float32)
+    index_around = None

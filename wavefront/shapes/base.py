@@ -3,42 +3,24 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Callable
-from typing import TYPE_CHECKING, Any, Self
+from typing import Any, Self
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from ..arrays.vec import Doubles
 from ..core.errors import number
+from ..core.parameter import Parameter
 from ..materials import Material, MaterialLike, as_material
 from .transform import rotation, scaling, translation
 
 
-class Checked:
-    """An attribute of a shape that is converted and checked whenever it is assigned.
+class Checked(Parameter[Any]):
+    """An attribute of a shape that is checked whenever it is assigned; in messages "bunny: vertices"."""
 
-    Parameters
-    ----------
-    convert
-        Called with the name for messages, such as "bunny: vertices", and the value; returns the value to
-        store, or raises a SceneError.
-    """
-
-    def __init__(self, convert: Callable[[str, Any], Any]) -> None:
-        self._convert, self._name = convert, ""
-
-    def __set_name__(self, owner: type, name: str) -> None:
-        """Record the name of the attribute."""
-        self._name = name
-
-    def __set__(self, shape: Any, value: Any) -> None:
+    def __set__(self, instance: Any, value: Any) -> None:
         """Store the converted value in the shape's own namespace."""
-        vars(shape)[self._name] = self._convert(f"{shape.name}: {self._name}", value)
-
-    if TYPE_CHECKING:
-
-        def __get__(self, shape: Any, owner: type) -> Any: ...
+        vars(instance)[self._name] = self.convert(f"{instance.name}: {self._name}", value)
 
 
 class Shape(ABC):
