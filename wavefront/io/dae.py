@@ -5,7 +5,6 @@ Positions are those of the file: trimesh applies neither `up_axis` nor `unit`. T
 
 from __future__ import annotations
 
-import os
 import re
 import zipfile
 from io import BytesIO
@@ -31,7 +30,7 @@ def parse(files: SceneFiles, data: bytes, strict: bool, materials: bool) -> tupl
     SceneError
         If the file is malformed; the message names the file and the error.
     """
-    name = os.fspath(files.scene)
+    name = files.name
     if zipfile.is_zipfile(BytesIO(data)):  # an archive may begin after other bytes
         raise SceneError(f"{name}: is an archive; unpack it first")
     document = _Document(name, data)

@@ -8,7 +8,6 @@ from __future__ import annotations
 import base64
 import binascii
 import json
-import os
 import struct
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
@@ -48,7 +47,7 @@ class Document:
 
     def __init__(self, files: SceneFiles, data: bytes) -> None:
         self.files = files
-        self.name = os.fspath(files.scene)
+        self.name = files.name
         text, self._binary = _chunks(self.name, data) if data[:4] == b"glTF" else (data, None)
         try:
             self.json = json.loads(text)

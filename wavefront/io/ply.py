@@ -6,7 +6,6 @@ ignores strips and refuses such polygons.
 
 from __future__ import annotations
 
-import os
 import re
 from collections.abc import Iterator
 from dataclasses import replace
@@ -35,7 +34,7 @@ def parse(files: SceneFiles, data: bytes, strict: bool, materials: bool) -> tupl
     SceneError
         If the file is malformed. The message names the file, and the line of a text.
     """
-    name = os.fspath(files.scene)
+    name = files.name
     elements = check_ply(name, data)
     lost = unread(elements)
     data, faces = _with_triangles(name, data, elements)

@@ -86,7 +86,7 @@ def _read_gltf(files: SceneFiles, data: bytes, options: LoadOptions) -> Contents
 
 
 def _read_obj(files: SceneFiles, data: bytes, options: LoadOptions) -> Contents:
-    name, strict, materials = os.fspath(files.scene), options.strict, options.materials
+    name, strict, materials = files.name, options.strict, options.materials
     parsed = obj.parse(name, decode_text(data), strict, options.limits)
     if parsed.ignored:
         listed = ", ".join(f"{keyword} (line {line})" for keyword, line in parsed.ignored.items())
@@ -114,7 +114,7 @@ def _libraries(files: SceneFiles, libraries: list[str], strict: bool) -> dict[st
     for library in dict.fromkeys(libraries):
         file = files.find(library)
         if not os.path.exists(file):  # also False for invalid names
-            warn(f"{os.fspath(files.scene)}: material file {library!r} is missing", strict)
+            warn(f"{files.name}: material file {library!r} is missing", strict)
             continue
         entries = mtl.parse(file, decode_text(files.read(file)), strict, files)
         specs.update(mtl.specs(entries, strict))
@@ -122,7 +122,7 @@ def _libraries(files: SceneFiles, libraries: list[str], strict: bool) -> dict[st
 
 
 def _read_ply(files: SceneFiles, data: bytes, options: LoadOptions) -> Contents:
-    name = os.fspath(files.scene)
+    name = files.name
     found, claimed = ply.parse(files, data, options.strict, options.materials)
     contents = trimesh_objects.read(found, name, options.strict)
     faces = sum(len(raw.faces) for raw in contents.raws)
@@ -133,21 +133,19 @@ def _read_ply(files: SceneFiles, data: bytes, options: LoadOptions) -> Contents:
 
 
 def _read_stl(files: SceneFiles, data: bytes, options: LoadOptions) -> Contents:
-    contents = Contents.once(stl.parse(os.fspath(files.scene), data, options.strict))
+    contents = Contents.once(stl.parse(files.name, data, options.strict))
     contents.up = "z"
     return contents
 
 
 def _read_off(files: SceneFiles, data: bytes, options: LoadOptions) -> Contents:
-    name = os.fspath(files.scene)
-    return trimesh_objects.read(
-        off.parse(name, data, options.strict, options.materials), name, options.strict
-    )
+    found = off.parse(files.name, data, options.strict, options.materials)
+    return trimesh_objects.read(found, files.name, options.strict)
 
 
 def _read_dae(files: SceneFiles, data: bytes, options: LoadOptions) -> Contents:
     found, up = dae.parse(files, data, options.strict, options.materials)
-    contents = trimesh_objects.read(found, os.fspath(files.scene), options.strict)
+    contents = trimesh_objects.read(found, files.name, options.strict)
     contents.up = up
     return contents
 
@@ -162,7 +160,7 @@ def _read_mitsuba(files: SceneFiles, data: bytes, options: LoadOptions) -> Conte
     from .mitsuba.convert import convert  # here, as programs that read no such scene need not pay for it
     from .mitsuba.document import Document
 
-    name = os.fspath(files.scene)
+    name = files.name
     document = Document(files, data, options.parameters)
     scene = convert(
         name, document.scene, files, document.find, mesh_reader(files, options.strict), options.strict
@@ -217,7 +215,7 @@ def _from_scene(load: Callable[[str, bytes], Scene]) -> Reader:
     """Return a reader that gives what `load`, a user's own function, makes of a file."""
 
     def read_scene(files: SceneFiles, data: bytes, options: LoadOptions) -> Contents:
-        name = os.fspath(files.scene)
+        name = files.name
         scene = load(name, data)
         if not isinstance(scene, Scene):
             raise SceneError(f"{name}: its reader returned {type(scene).__name__}; it must return a wf.Scene")
@@ -245,14 +243,5 @@ READERS: Registry[Reader] = Registry(
     },
     adapt=_from_scene,
 )
-PLAIN = (
-    ".obj",
-    ".ply",
-    ".stl",
-    ".glb",
-    ".gltf",
-    ".off",
-    ".dae",
-    ".xml",
-    ".pbrt",
-)  # formats that are no archives
+# formats that are no archives
+PLAIN = (".obj", ".ply", ".stl", ".glb", ".gltf", ".off", ".dae", ".xml", ".pbrt")

@@ -122,6 +122,11 @@ class SceneFiles:
     def __post_init__(self) -> None:
         object.__setattr__(self, "budget", Budget(self.limits.pixels, self.limits.memory_bytes))
 
+    @property
+    def name(self) -> str:
+        """The path of the scene file, for messages."""
+        return os.fspath(self.scene)
+
     def find(self, reference: str, base: PathLike | None = None) -> Path:
         """Return the path of a file that the scene refers to by a relative name.
 

@@ -5,7 +5,6 @@ Positions are those of the file, mostly in millimeters with z up.
 
 from __future__ import annotations
 
-import os
 import zipfile
 from array import array
 from dataclasses import dataclass, field
@@ -43,7 +42,7 @@ def parse(files: SceneFiles, data: bytes, strict: bool, materials: bool) -> Cont
     SceneError
         If the file is malformed; the message names the file and the error.
     """
-    name = os.fspath(files.scene)
+    name = files.name
     models = _models(files, data)
     package = _Package(name, models)
     check_expanded(name, package.children, {}, "build")
@@ -61,7 +60,7 @@ def parse(files: SceneFiles, data: bytes, strict: bool, materials: bool) -> Cont
 
 def _models(files: SceneFiles, data: bytes) -> dict[str, bytearray]:
     """Return the members of the archive that are read: the model, and those that it refers to."""
-    name, most = os.fspath(files.scene), files.limits.unpacked_bytes
+    name, most = files.name, files.limits.unpacked_bytes
     try:
         with zipfile.ZipFile(BytesIO(data)) as archive:
             members = checked_members(archive, MAX_MEMBERS)

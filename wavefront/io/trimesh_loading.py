@@ -35,7 +35,7 @@ class Images:
                 file = self.files.find(unquote(reference))
             if os.path.exists(file):
                 content = self.files.read(file)
-                name = f"{os.fspath(self.files.scene)}: texture {reference!r}"
+                name = f"{self.files.name}: texture {reference!r}"
                 decode_codes(content, name, self.files.budget)
                 return content
         except SceneError as error:
@@ -49,7 +49,7 @@ class Images:
         if self.error is not None:
             raise self.error
         for name in dict.fromkeys(self.missing):
-            warn(f"{os.fspath(self.files.scene)}: texture {name!r} is missing", strict)
+            warn(f"{self.files.name}: texture {name!r} is missing", strict)
 
 
 def by_trimesh(name: str, data: bytes, kind: str, images: Any = None, skip_materials: bool = False) -> Any:

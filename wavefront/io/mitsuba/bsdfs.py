@@ -33,14 +33,8 @@ from .textures import bitmap, color, roughness, scalar
 
 LEAST_INDEX = 1e-6
 MAPPED = "use_shadowing_function flip_invalid_normals"
-ONE_SIDED = (
-    "diffuse",
-    "conductor",
-    "roughconductor",
-    "plastic",
-    "roughplastic",
-    "measured",
-)  # the back is black
+# the back is black
+ONE_SIDED = ("diffuse", "conductor", "roughconductor", "plastic", "roughplastic", "measured")
 
 
 class ShadingFrameMap(NormalMap):

@@ -85,11 +85,11 @@ class Document:
         self._files, self._included, self._aliases = files, 0, dict[str, str]()
         self._values = {name: _as_text(value) for name, value in parameters.items()}
         self._unused = set(self._values)
-        self.folders = [Path(os.fspath(files.scene)).parent]
-        self.scene = self._read(Path(os.fspath(files.scene)), data, 0)
+        self.folders = [Path(files.name).parent]
+        self.scene = self._read(Path(files.name), data, 0)
         for name in sorted(self._unused):
             hint = did_you_mean(name, self._values.keys() - self._unused)
-            raise SceneError(f"{os.fspath(files.scene)}: does not use the parameter {name!r}{hint}")
+            raise SceneError(f"{files.name}: does not use the parameter {name!r}{hint}")
 
     def find(self, reference: str) -> Path:
         """Return the path of a file that the scene refers to: in its folder, or in one of a `<path>`."""

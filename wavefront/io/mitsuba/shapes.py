@@ -97,13 +97,7 @@ def _cylinder(node: Node, job: Job) -> list[Shape]:
     return _mesh(node, job, RawMesh("cylinder", vertices, faces, np.tile(across, (2, 1)), uvs))
 
 
-@plugin(
-    "sphere",
-    "shape",
-    f"{SURFACE} center radius",
-    PARTS,
-    note="one radius",
-)
+@plugin("sphere", "shape", f"{SURFACE} center radius", PARTS, note="one radius")
 def _sphere(node: Node, job: Job) -> list[Shape]:
     center = node.vector("center", (0, 0, 0))
     radius = node.number("radius", 1.0, lambda x: x > 0, "above 0")
@@ -139,13 +133,7 @@ def _file(node: Node, job: Job) -> list[Shape]:
     return _mesh(node, job, replace(raw, name=path.stem), smooth=True)
 
 
-@plugin(
-    "serialized",
-    "shape",
-    f"{SURFACE} filename shape_index face_normals",
-    PARTS,
-    note="versions 3 and 4",
-)
+@plugin("serialized", "shape", f"{SURFACE} filename shape_index face_normals", PARTS, note="versions 3 and 4")
 def _serialized(node: Node, job: Job) -> list[Shape]:
     path = job.find(node.text("filename"))
     key = (path, node.whole("shape_index", 0))

@@ -142,12 +142,7 @@ def _srgb(node: Node, job: Job) -> Value:
     return base
 
 
-@plugin(
-    "bitmap",
-    "texture",
-    "filename bitmap data raw to_uv wrap_mode filter_type",
-    harmless="accel format",
-)
+@plugin("bitmap", "texture", "filename bitmap data raw to_uv wrap_mode filter_type", harmless="accel format")
 def bitmap(node: Node, job: Job, channel: Any = None, plain: bool = False) -> Texture:
     """Return an image; `plain` for data that must be linear, such as heights."""
     job.check(node)

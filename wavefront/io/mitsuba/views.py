@@ -134,12 +134,7 @@ def _sampler(node: Node, job: Job) -> Settings:
 
 
 @plugin("path volpath volpathmis ptracer prb", "integrator", "max_depth rr_depth hide_emitters")
-@plugin(
-    "direct",
-    "integrator",
-    "hide_emitters",
-    harmless="shading_samples emitter_samples bsdf_samples",
-)
+@plugin("direct", "integrator", "hide_emitters", harmless="shading_samples emitter_samples bsdf_samples")
 @plugin("moment aov", "integrator", "hide_emitters", "integrator", harmless="aovs", note="that in it counts")
 def _integrator(node: Node, job: Job) -> Settings:
     if node.plugin in ("moment", "aov"):

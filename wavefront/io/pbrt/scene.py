@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -305,11 +304,11 @@ def read_scene(
             raise SceneError(f"file {reference!r} is missing")
         return path
 
-    reader = Reader(Job(os.fspath(files.scene), files, find, read_mesh, strict))
-    for statement in statements(files, Path(os.fspath(files.scene)), data):
+    reader = Reader(Job(files.name, files, find, read_mesh, strict))
+    for statement in statements(files, Path(files.name), data):
         with placed(statement.place):
             reader.run(statement)
-    with placed(os.fspath(files.scene)):
+    with placed(files.name):
         return reader.finish()
 
 

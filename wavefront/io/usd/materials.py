@@ -158,7 +158,7 @@ class Materials:
             if asset.GetSize() > self.files.limits.file_bytes:
                 raise SceneError(f"{name}: has {asset.GetSize()} bytes; the limit is LoadLimits.file_bytes")
             return decode_codes(bytes(asset.GetBuffer()), name[:-1], self.files.budget)
-        folder = Path(os.fspath(self.files.scene)).resolve().parent
+        folder = Path(self.files.name).resolve().parent
         path = self.files.find(os.path.relpath(name, folder) if os.path.isabs(name) else name)
         return self.files.image(path) if path.exists() else None
 

@@ -41,7 +41,7 @@ def read_usd(files: SceneFiles, strict: bool, time: float | None = None) -> Cont
     SceneError
         If usd-core is not installed, the file is malformed, or it refers to files elsewhere.
     """
-    name = os.fspath(files.scene)
+    name = files.name
     try:
         from pxr import Sdf, Usd
     except ImportError as error:
@@ -61,7 +61,7 @@ def read_usd(files: SceneFiles, strict: bool, time: float | None = None) -> Cont
 
 def _check_layers(files: SceneFiles, stage: Any) -> None:
     """Check that all layers are in the folders that the scene may read."""
-    roots = [Path(os.fspath(files.scene)).resolve().parent, *(each.resolve() for each in files.search_paths)]
+    roots = [Path(files.name).resolve().parent, *(each.resolve() for each in files.search_paths)]
     for layer in stage.GetUsedLayers():
         path = layer.realPath.partition("[")[0]
         if path and not any(Path(path).resolve().is_relative_to(root) for root in roots):
@@ -98,7 +98,7 @@ class _Reader:
         self._walk(self.stage.GetPseudoRoot(), np.diag([self.unit] * 3 + [1.0]))
         if self.lost:
             listed = ", ".join(f"{where} {what}" for where, what in self.lost)
-            warn(f"{os.fspath(self.files.scene)}: not honored: {listed}", strict)
+            warn(f"{self.files.name}: not honored: {listed}", strict)
         matrices = np.array([matrix for _, matrix in self.placed]).reshape(-1, 4, 4)
         places = Places(np.array([number for number, _ in self.placed], np.intp), matrices)
         up = str(UsdGeom.GetStageUpAxis(self.stage)).lower()
