@@ -4,19 +4,22 @@ import numpy as np
 import pytest
 import strategies
 from hypothesis import given
-from scenes import ALBEDO, BLACK, EYE, HERE, floor, probe
-from significance import SIDE, assert_mean, assert_same_images, measure, render, repeat
+from scenes import ALBEDO, BLACK, EYE, HERE, floor, panel, probe
+from significance import SIDE, Mean, assert_mean, assert_same_images, measure, render, repeat
 
 import wavefront as wf
 from wavefront import testing
+from wavefront.accel.numpy_accel import NumpyAccelerator
 from wavefront.arrays.vec import f4
 from wavefront.codecs.display import Display
 from wavefront.codecs.encoding import srgb_to_linear
 from wavefront.codecs.images import write_image
+from wavefront.compile.scene import compile_scene
 from wavefront.lights import ConstantEnvironment, EnvironmentSum
 
 ORIGIN = np.zeros(3)
 SAMPLING = ("direct_simple", "direct_mis", "full")
+U = np.random.default_rng(6).random((2, 500), f4)
 
 
 def turn(around_y: float, around_x: float = 0.0) -> np.ndarray:
@@ -441,14 +444,17 @@ def test_beside_bsdf_samples_what_is_brighter_than_the_mean_is_drawn(transform) 
 
 @pytest.mark.parametrize("radiance", [1.0, np.ones((4, 8, 3)), np.full((16, 32, 3), 0.3)])
 def test_light_from_all_around_takes_no_light_samples_beside_bsdf_samples(radiance) -> None:
-    """No shadow ray is traced, but by the integrator that has nothing else."""
+    """No shadow ray is traced, but by what has nothing else; what paths meet counts in full."""
     scene = wf.Scene([floor()], [wf.Environment(radiance)], wf.Camera.look_at(EYE, HERE, size=(8, 8)))
     for integrator, shadow_rays in (("full", 0), ("direct_mis", 0), ("direct_simple", 1)):
         image = wf.render(scene, 64, integrator=integrator, max_bounces=1, progress=False)
         rays = image.metadata["rays"] / image.metadata["samples"]
         # direct_simple draws half of its directions from below the floor, where no ray is needed
         assert rays == pytest.approx(2 - 0.5 * shadow_rays, abs=0.1), integrator
-        assert image.rgb.mean() == pytest.approx(ALBEDO * radiance_of(radiance), rel=0.02)
+        expected = ALBEDO * radiance_of(radiance)
+        assert image.rgb.mean() == pytest.approx(expected, rel=0.02)
+        if not shadow_rays:
+            assert image.rgb == pytest.approx(np.full((8, 8, 3), expected), rel=1e-5)
 
 
 def radiance_of(radiance) -> float:
@@ -466,6 +472,21 @@ def test_a_sun_before_an_even_sky_gets_all_light_samples() -> None:
     assert sky.power(2.0) == pytest.approx(SUNS[0].record(ORIGIN).power(2.0))
     sample = sky.sample_li(w, np.random.default_rng(4).random((2, 20_000)).astype(f4))
     assert (sample.radiance > 0.5).all()
+
+
+@pytest.mark.parametrize("material", [wf.Diffuse(ALBEDO), wf.Conductor.named("gold", roughness=0.7)])
+def test_an_even_sky_leaves_all_light_samples_to_a_panel(material) -> None:
+    """The estimators with BSDF samples draw the panel alone; light samples alone bring the same light."""
+    scene = wf.Scene([floor(material), panel((-1, -1), (1, 1), 1)], wf.Environment(0.5), probe(HERE, EYE))
+    for mis, drawn in ((False, [True, True]), (True, [True, False])):
+        lights = compile_scene(scene, NumpyAccelerator, mis=mis).lights
+        number = lights.sample_li(np.zeros((3, 500), f4), np.linspace(0, 1, 500, False, dtype=f4), U)[1]
+        assert lights.chosen_from.tolist() == drawn
+        assert np.isin([0, 1], number).tolist() == drawn
+    found = [measure(scene, 2048, integrator=each, max_bounces=1) for each in SAMPLING]
+    for mean in found[1:]:
+        error = float(np.hypot(mean.error, found[0].error))
+        assert_mean(Mean(mean.value, error, mean.batches), found[0].value, 0.004)
 
 
 @pytest.mark.slow
