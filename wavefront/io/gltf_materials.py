@@ -5,6 +5,7 @@ Their numbers are those of the JSON, unrounded.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -24,26 +25,6 @@ from .gltf_specular_glossiness import F0, BesideSpecular
 
 WRAPS = {10497: "repeat", 33071: "clamp", 33648: "mirror"}
 NEAREST, LINEAR = 9728, 9729
-# extensions whose properties are all read here or in gltf.py
-KNOWN = frozenset(
-    "KHR_" + name
-    for name in (
-        "lights_punctual",
-        "materials_anisotropy",
-        "materials_clearcoat",
-        "materials_dispersion",
-        "materials_emissive_strength",
-        "materials_ior",
-        "materials_iridescence",
-        "materials_pbrSpecularGlossiness",
-        "materials_sheen",
-        "materials_specular",
-        "materials_transmission",
-        "materials_volume",
-        "mesh_quantization",
-        "texture_transform",
-    )
-) | {"EXT_mesh_gpu_instancing"}
 IMAGES = 4  # all images of a file may have this many times the pixels of the largest
 BESIDE = frozenset(  # extensions that may occur with specular-glossiness; the others exclude it
     ("KHR_materials_pbrSpecularGlossiness", "KHR_materials_emissive_strength", "KHR_texture_transform")
@@ -172,18 +153,9 @@ class _Reader:
 
     def _extended(self, extensions: dict[str, Any]) -> None:
         """Read the extensions of metallic-roughness."""
-        self._ior(extensions.get("KHR_materials_ior"))
-        self._transmission(
-            extensions.get("KHR_materials_transmission"), extensions.get("KHR_materials_volume")
-        )
-        self._clearcoat(extensions.get("KHR_materials_clearcoat"))
-        self._sheen(extensions.get("KHR_materials_sheen"))
-        self._anisotropy(extensions.get("KHR_materials_anisotropy"))
-        self._specular(extensions.get("KHR_materials_specular"))
-        self._iridescence(extensions.get("KHR_materials_iridescence"))
-        dispersion = extensions.get("KHR_materials_dispersion", {})
-        self._want("dispersion", self._number(dispersion, "dispersion", 0.0, high=np.inf), 0.0)
-        self._volume(extensions.get("KHR_materials_volume"))
+        for name, read in EXTENSIONS.items():
+            if extensions.get(name) is not None:
+                read(self, extensions[name])
         self._lost += [name for name in extensions if name not in KNOWN]
 
     def _number(self, group: dict[str, Any], key: str, default: float, high: float = 1.0) -> float:
@@ -282,28 +254,22 @@ class _Reader:
         except SceneError as error:
             raise SceneError(f"{where}: {error}") from error
 
-    def _ior(self, group: dict[str, Any] | None) -> None:
-        if group is None:
-            return
+    def _ior(self, group: dict[str, Any]) -> None:
         ior = self._number(group, "ior", 1.5, high=MAX_INDEX)
         if ior < 1:  # 0 means an infinite index: everything is reflected
             self._lost.append(f"ior {ior:g}")
         else:
             self._want("ior", ior, 1.5)
 
-    def _transmission(self, group: dict[str, Any] | None, volume: dict[str, Any] | None) -> None:
-        if group is None:
-            return
-        self._want(
-            "transmission", self._scalar(group, "transmissionFactor", "transmissionTexture", 0, 0.0), 0.0
-        )
+    def _transmission(self, group: dict[str, Any]) -> None:
+        part = self._scalar(group, "transmissionFactor", "transmissionTexture", 0, 0.0)
+        self._want("transmission", part, 0.0)
+        volume = self._item["extensions"].get("KHR_materials_volume")
         thick = volume is not None and self._number(volume, "thicknessFactor", 0.0, high=np.inf) > 0
         if "transmission" in self._wanted and not thick:
             self._wanted["thin"] = True
 
-    def _clearcoat(self, group: dict[str, Any] | None) -> None:
-        if group is None:
-            return
+    def _clearcoat(self, group: dict[str, Any]) -> None:
         self._want("clearcoat", self._scalar(group, "clearcoatFactor", "clearcoatTexture", 0, 0.0), 0.0)
         if "clearcoat" not in self._wanted:
             return
@@ -312,9 +278,7 @@ class _Reader:
         if "clearcoatNormalTexture" in group:
             self._lost.append("clearcoatNormalTexture")
 
-    def _anisotropy(self, group: dict[str, Any] | None) -> None:
-        if group is None:
-            return
+    def _anisotropy(self, group: dict[str, Any]) -> None:
         strength = self._scalar(group, "anisotropyStrength", "anisotropyTexture", 2, 0.0)
         if not isinstance(strength, Texture) and strength == 0:
             return
@@ -329,9 +293,7 @@ class _Reader:
         else:
             self._wanted["roughness"] = float(np.sqrt(across**2 + (1 - across**2) * strength**2))
 
-    def _sheen(self, group: dict[str, Any] | None) -> None:
-        if group is None:
-            return
+    def _sheen(self, group: dict[str, Any]) -> None:
         factor = self._color(group, "sheenColorFactor", [0.0, 0.0, 0.0])
         if not factor.any():
             return
@@ -342,18 +304,14 @@ class _Reader:
             group, "sheenRoughnessFactor", "sheenRoughnessTexture", 3, 0.0
         )
 
-    def _specular(self, group: dict[str, Any] | None) -> None:
-        if group is None:
-            return
+    def _specular(self, group: dict[str, Any]) -> None:
         self._want("specular", self._scalar(group, "specularFactor", "specularTexture", 3, 1.0), 1.0)
         factor = self._color(group, "specularColorFactor", [1.0, 1.0, 1.0], high=FLOAT32_MAX)
         texture = self._texture(group, "specularColorTexture", scale=factor)
         if texture is not None or (factor != 1).any():
             self._wanted["specular_color"] = factor if texture is None else texture
 
-    def _iridescence(self, group: dict[str, Any] | None) -> None:
-        if group is None:
-            return
+    def _iridescence(self, group: dict[str, Any]) -> None:
         factor = self._number(group, "iridescenceFactor", 0.0)
         if factor == 0:
             return
@@ -367,10 +325,11 @@ class _Reader:
         if "film_thickness" in self._wanted:
             self._wanted["film_ior"] = self._number(group, "iridescenceIor", 1.3, high=MAX_INDEX)
 
-    def _volume(self, group: dict[str, Any] | None) -> None:
+    def _dispersion(self, group: dict[str, Any]) -> None:
+        self._want("dispersion", self._number(group, "dispersion", 0.0, high=np.inf), 0.0)
+
+    def _volume(self, group: dict[str, Any]) -> None:
         """Beer–Lambert: `attenuationColor` is the transmittance over `attenuationDistance`."""
-        if group is None:
-            return
         if "thicknessTexture" in group:
             self._lost.append("thicknessTexture (light goes through the volume that the mesh encloses)")
         color = self._color(group, "attenuationColor", [1.0, 1.0, 1.0])
@@ -389,6 +348,22 @@ class _Reader:
             return None
         texture = self._texture(self._item, "emissiveTexture", scale=factor)
         return factor if texture is None else texture
+
+
+# extensions of metallic-roughness, in the order in which they are read
+EXTENSIONS: dict[str, Callable[[_Reader, dict[str, Any]], None]] = {
+    "KHR_materials_ior": _Reader._ior,
+    "KHR_materials_transmission": _Reader._transmission,
+    "KHR_materials_clearcoat": _Reader._clearcoat,
+    "KHR_materials_sheen": _Reader._sheen,
+    "KHR_materials_anisotropy": _Reader._anisotropy,
+    "KHR_materials_specular": _Reader._specular,
+    "KHR_materials_iridescence": _Reader._iridescence,
+    "KHR_materials_dispersion": _Reader._dispersion,
+    "KHR_materials_volume": _Reader._volume,
+}
+# extensions whose properties are all read here or in gltf.py
+KNOWN = {*EXTENSIONS, *BESIDE, "KHR_lights_punctual", "KHR_mesh_quantization", "EXT_mesh_gpu_instancing"}
 
 
 def _check_extensions(document: Document) -> None:
