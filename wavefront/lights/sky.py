@@ -123,6 +123,8 @@ class Sky(Parametrized, Light):
 
     Notes
     -----
+    The parameters may be assigned later, too; the function stays that of the sun's first height.
+
     `from_photometric` turns illuminances in lux into the irradiances of white light that are asked for here.
 
     Raises
