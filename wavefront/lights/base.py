@@ -9,7 +9,7 @@ center. Every pdf is in solid angle.
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from typing import Any, ClassVar
+from typing import Any, ClassVar, Self
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -126,6 +126,16 @@ class Light(ABC):
         raise SceneError(
             f"{type(self).__name__} has no scaled(factor), which a scene as large or small as this needs"
         )
+
+
+class FarLight(Light):
+    """Base class of lights that are infinitely far away, so that they have no length."""
+
+    __slots__ = ()
+
+    def scaled(self, factor: float) -> Self:
+        """Return the light itself."""
+        return self
 
 
 class LightRecord(SoA, Light):

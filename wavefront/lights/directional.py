@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from typing import Self
-
 import numpy as np
 from numpy.typing import ArrayLike
 
@@ -17,7 +15,7 @@ from ..core.errors import SceneError, finite_array, number
 from ..core.parameter import Parameter, Parametrized, parametrized
 from ..film.aov_names import DEFAULT_GROUP, group_name
 from ..sampling.warp import uniform_cone
-from .base import DeltaLight, Emitters, Light, LightSample
+from .base import DeltaLight, Emitters, FarLight, LightSample
 from .infinite import InfiniteLight, at_infinity, facing_irradiance, through_scene, turned
 
 MIN_ANGLE = 0.01  # degrees; float32 directions cannot tell a smaller disk's edge to a percent
@@ -108,7 +106,7 @@ def _angle(name: str, value: float) -> float:
 
 
 @parametrized
-class DirectionalLight(Parametrized, Light):
+class DirectionalLight(Parametrized, FarLight):
     """A directional light, infinitely far away, such as the sun.
 
     Parameters
@@ -140,10 +138,6 @@ class DirectionalLight(Parametrized, Light):
     irradiance: Parameter[ArrayLike] = Parameter(rgb)
     angle: Parameter[float] = Parameter(_angle, default=0.0, kw_only=True)
     group: Parameter[str] = Parameter(group_name, default=DEFAULT_GROUP, kw_only=True)
-
-    def scaled(self, factor: float) -> Self:
-        """Return the light: it has no length."""
-        return self
 
     def record(self, center: Doubles) -> DirectionalLights | SunLight:
         """Return the light as a record of one column."""

@@ -20,7 +20,7 @@ from ..core.parameter import Parameter, Parametrized
 from ..core.suggestions import suggests_keywords
 from ..film.aov_names import DEFAULT_GROUP, group_name
 from ..sampling.warp import uniform_sphere
-from .base import Light, LightSample
+from .base import FarLight, LightSample
 from .image import ImageEnvironment, environment_pixels
 from .infinite import InfiniteLight, at_infinity, through_scene
 
@@ -55,7 +55,7 @@ class ConstantEnvironment(InfiniteLight):
         return self.share * through_scene(4 * np.pi * self.radiance.mean(0, dtype=np.float64), scene_radius)
 
 
-class Environment(Parametrized, Light):
+class Environment(Parametrized, FarLight):
     """An environment: light from infinitely far away, seen wherever a ray leaves the scene.
 
     Parameters
@@ -158,10 +158,6 @@ class Environment(Parametrized, Light):
             self._radiance, self._image = image.mean, image
         else:
             self._radiance, self._image = rgb("Environment radiance", radiance) * self._scale, None
-
-    def scaled(self, factor: float) -> Self:
-        """Return the light: it has no length."""
-        return self
 
     def record(self, center: Doubles) -> InfiniteLight:
         """Return the light as a record of one column."""

@@ -12,10 +12,10 @@ from ..arrays.soa import soa
 from ..arrays.state import SurfaceInteraction
 from ..arrays.vec import ALL, Doubles, Floats, Lanes, column, f4
 from ..sampling.discrete import Discrete
-from .base import LightRecord, LightSample, Receiver, lit_for
+from .base import FarLight, LightRecord, LightSample, Receiver, lit_for
 
 
-class InfiniteLight(LightRecord):
+class InfiniteLight(FarLight, LightRecord):
     """Base class of lights that rays meet where they leave the scene. All lanes share one.
 
     Examples
@@ -28,10 +28,6 @@ class InfiniteLight(LightRecord):
 
     def record(self, center: Doubles) -> Self:
         """Return the light: it is the same from everywhere."""
-        return self
-
-    def scaled(self, factor: float) -> Self:
-        """Return the light: it has no length."""
         return self
 
     def __len__(self) -> int:

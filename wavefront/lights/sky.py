@@ -19,7 +19,7 @@ from ..colors import from_photometric, rgb
 from ..core.errors import SceneError, finite_array, number
 from ..core.parameter import Parameter, Parametrized, brief, instance_of, optional, parametrized
 from ..film.aov_names import DEFAULT_GROUP, group_name
-from .base import Light, LightSample, Receiver
+from .base import FarLight, LightSample, Receiver
 from .directional import DirectionalLight, unit
 from .hosek_wilkie import hosek_wilkie_sky
 from .image import ImageEnvironment
@@ -87,7 +87,7 @@ def _irradiance(name: str, value: ArrayLike) -> Doubles:
 
 
 @parametrized
-class Sky(Parametrized, Light):
+class Sky(Parametrized, FarLight):
     """The light of the sky and the sun; made by `Sky.cie`, `Sky.perez` or `Sky.hosek_wilkie`.
 
     The sky is infinitely far away. Above the horizon its radiance is the formula of the model, with no table
@@ -348,10 +348,6 @@ class Sky(Parametrized, Light):
         if not length.all():
             raise SceneError("directions must not be zero")
         return self._light.le(np.ascontiguousarray((given / length).T, f4)).T.astype(float)
-
-    def scaled(self, factor: float) -> Self:
-        """Return the light: it has no length."""
-        return self
 
     def record(self, center: Doubles) -> InfiniteLight:
         """Return the sky, and the sun in it, as a record of one column."""
