@@ -11,7 +11,7 @@ from io import BytesIO
 from typing import Any
 
 from ..core.errors import SceneError
-from .repair import warn
+from .repair import warn, warn_of_lost
 from .sources import SceneFiles
 from .trimesh_loading import Images, by_trimesh
 from .xml_checks import check_expanded, look_through, total
@@ -40,8 +40,7 @@ def parse(files: SceneFiles, data: bytes, strict: bool, materials: bool) -> tupl
     lost = [f"{tag} (line {line})" for tag, line in document.lost.items()]
     if any(map(_is_clear, found.geometry.values())):
         lost.append("opacity of materials")
-    if lost and materials:
-        warn(f"{name}: not honored: {', '.join(lost)}", strict)
+    warn_of_lost(name, lost if materials else (), strict)
     if materials:
         images.report(strict)
     # pycollada drops damaged parts without a warning

@@ -49,7 +49,7 @@ from ..textures.image import StoredImage, Texture
 from ..textures.normal_map import BaseNormalMap, BumpMap, NormalMap
 from ..textures.parameter import MAX_INDEX
 from .appearance import MaterialSpec, build_material
-from .repair import warn
+from .repair import warn, warn_of_lost
 from .sources import SceneFiles
 
 # values of `illum`
@@ -280,10 +280,8 @@ def specs(entries: dict[str, Entry], strict: bool = False) -> dict[str, Material
         out[name].material.name = printable(name)
         for keyword in (*entry.unread(), *sorted(entry.idle_options), *out[name].lost):
             unread.setdefault(keyword, name)
-    if unread:
-        file = next(iter(entries.values())).file
-        listed = ", ".join(f"{keyword} (material {name!r})" for keyword, name in unread.items())
-        warn(f"{file}: not honored: {listed}", strict)
+    file = next((entry.file for entry in entries.values()), "")
+    warn_of_lost(file, (f"{keyword} (material {name!r})" for keyword, name in unread.items()), strict)
     return out
 
 

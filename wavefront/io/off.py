@@ -7,7 +7,7 @@ from typing import Any
 from ..core.errors import SceneError
 from ..core.files import decode_text
 from ..core.plural import plural
-from .repair import warn
+from .repair import warn_of_lost
 from .trimesh_loading import by_trimesh
 
 HEADERS = {"OFF": [], "COFF": ["colors of vertices"], "NOFF": ["normals"], "STOFF": ["texture coordinates"]}
@@ -42,8 +42,7 @@ def parse(name: str, data: bytes, strict: bool, materials: bool) -> Any:
     lost = list(HEADERS[header])
     if any(len(words) > int(words[0]) + 1 for _, words in rows[vertices : vertices + faces]):
         lost.append("colors of faces")
-    if lost and materials:
-        warn(f"{name}: not honored: {', '.join(lost)}", strict)
+    warn_of_lost(name, lost if materials else (), strict)
     # only the counts and the rows that they cover: trimesh would also read the lines after them
     text = [f"OFF\n{vertices} {faces} 0", *(" ".join(words) for _, words in rows[: vertices + faces])]
     return by_trimesh(name, "\n".join(text).encode(), "off")

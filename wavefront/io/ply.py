@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from ..core.errors import SceneError
 from ..core.plural import plural
 from .ply_header import SIZES, TYPES, Element, check_ply, ply_textures, unread
-from .repair import warn
+from .repair import warn, warn_of_lost
 from .sources import SceneFiles
 from .trimesh_import import import_trimesh
 from .trimesh_loading import Images, by_trimesh
@@ -41,8 +41,7 @@ def parse(files: SceneFiles, data: bytes, strict: bool, materials: bool) -> tupl
     if faces is not None:
         lost += [f"{what} of {faces.name}" for what in faces.properties if not what.startswith("vertex_ind")]
         elements = [faces]
-    if lost and materials:
-        warn(f"{name}: not honored: {', '.join(dict.fromkeys(lost))}", strict)
+    warn_of_lost(name, dict.fromkeys(lost) if materials else (), strict)
     textures = ply_textures(data)
     if len(textures) > 1 and materials:
         warn(f"{name}: not honored: several textures; {textures[-1]!r} is taken for all faces", strict)

@@ -20,7 +20,7 @@ from .clouds import cloud, cloud_of_trimesh
 from .contents import Contents
 from .gltf_materials import GltfMaterials
 from .placing import Places
-from .repair import RawMesh, warn
+from .repair import RawMesh, warn, warn_of_lost
 from .sources import LoadLimits, PathLike, SceneFiles
 
 
@@ -78,9 +78,9 @@ def _read_gltf(files: SceneFiles, data: bytes, options: LoadOptions) -> Contents
             # without a material, the mesh gets the default material, as in memory
             if options.materials and not assign_material(raw, None if number is None else specs.spec(number)):
                 document.lose("vertex colors", f"mesh {raw.name!r}")
-    if document.lost and options.materials:
-        listed = ", ".join(f"{what} ({where})" for what, where in document.lost.items())
-        warn(f"{document.name}: not honored: {listed}", options.strict)
+    if options.materials:
+        lost = (f"{what} ({where})" for what, where in document.lost.items())
+        warn_of_lost(document.name, lost, options.strict)
     raws = [raw for raw, _ in found.raws]
     return Contents(raws, found.places, found.lights, found.camera, flat=True)
 
@@ -88,9 +88,7 @@ def _read_gltf(files: SceneFiles, data: bytes, options: LoadOptions) -> Contents
 def _read_obj(files: SceneFiles, data: bytes, options: LoadOptions) -> Contents:
     name, strict, materials = files.name, options.strict, options.materials
     parsed = obj.parse(name, decode_text(data), strict, options.limits)
-    if parsed.ignored:
-        listed = ", ".join(f"{keyword} (line {line})" for keyword, line in parsed.ignored.items())
-        warn(f"{name}: not honored: {listed}", strict)
+    warn_of_lost(name, (f"{keyword} (line {line})" for keyword, line in parsed.ignored.items()), strict)
     if parsed.points is not None:
         codes = None if parsed.points.shape[1] < 6 else from_srgb(parsed.points[:, 3:])
         points = cloud(name, parsed.points[:, :3], codes, strict)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass, field, replace
 from typing import Any
 
@@ -28,6 +29,12 @@ def warn(message: str, strict: bool) -> None:
     if strict:
         raise SceneError(message)
     warn_caller(message)
+
+
+def warn_of_lost(name: str, lost: Iterable[str], strict: bool) -> None:
+    """Warn of what is not honored in a file, if anything is; if strict, raise a SceneError instead."""
+    if listed := ", ".join(lost):
+        warn(f"{name}: not honored: {listed}", strict)
 
 
 def wide(values: NDArray[Any]) -> Table:

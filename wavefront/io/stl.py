@@ -9,7 +9,7 @@ import numpy as np
 from ..core.errors import SceneError
 from ..core.files import decode_text
 from ..core.plural import plural
-from .repair import RawMesh, warn, wide
+from .repair import RawMesh, warn_of_lost, wide
 from .text_lines import NUMBER, check_lines, words
 from .trimesh_loading import geometries
 
@@ -45,8 +45,7 @@ def _binary(name: str, data: bytes, strict: bool) -> list[RawMesh]:
     extra = [mesh["face_attributes"]["stl"] for mesh in meshes]
     if extra and extra[0].any():
         colored.append(f"colors of facets (facet {int((extra[0] != 0).argmax())})")
-    if colored:
-        warn(f"{name}: not honored: {', '.join(colored)}", strict)
+    warn_of_lost(name, colored, strict)
     return [RawMesh("", wide(mesh["vertices"]), mesh["faces"]) for mesh in meshes]
 
 

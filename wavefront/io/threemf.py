@@ -22,7 +22,7 @@ from ..shapes.transform import IDENTITY, Matrix
 from .appearance import MaterialSpec, assign_material
 from .contents import Contents
 from .placing import Places
-from .repair import RawMesh, Table, warn
+from .repair import RawMesh, Table, warn_of_lost
 from .sources import SceneFiles
 from .xml_checks import check_expanded, look_through
 
@@ -53,8 +53,7 @@ def parse(files: SceneFiles, data: bytes, strict: bool, materials: bool) -> Cont
         of.append(numbers.setdefault(key, len(numbers)))
         matrices.append(matrix)
     raws = [package.raw(key, materials) for key in numbers]
-    if package.lost and materials:
-        warn(f"{name}: not honored: {', '.join(package.lost)}", strict)
+    warn_of_lost(name, package.lost if materials else (), strict)
     return Contents(raws, Places(np.array(of, np.intp), np.array(matrices).reshape(-1, 4, 4)))
 
 

@@ -19,7 +19,7 @@ from .appearance import MaterialSpec, assign_material, build_material, from_srgb
 from .contents import Contents
 from .mtl import MATTE
 from .placing import Places
-from .repair import RawMesh, Table, warn, with_face_colors
+from .repair import RawMesh, Table, warn_of_lost, with_face_colors
 from .trimesh_import import import_trimesh
 
 if TYPE_CHECKING:
@@ -44,9 +44,7 @@ def read(geometry: Any, source: str, strict: bool) -> Contents:
             numbers[id(mesh)] = len(raws)
             raws.append(_raw(mesh, name, source))
             specs.assign_material(raws[-1], mesh, {geometry.source.file_type, mesh.source.file_type})
-    if specs.lost:
-        listed = ", ".join(f"{what} (mesh {where!r})" for what, where in specs.lost.items())
-        warn(f"{source}: not honored: {listed}", strict)
+    warn_of_lost(source, (f"{what} (mesh {where!r})" for what, where in specs.lost.items()), strict)
     of = np.array([numbers[id(mesh)] for mesh, *_ in nodes], np.intp)
     matrices = np.array([matrix for *_, matrix, _ in nodes]).reshape(-1, 4, 4)
     several = np.bincount(of, minlength=len(raws)).take(of) > 1

@@ -21,7 +21,7 @@ from ...textures import Texture
 from ..contents import Contents
 from ..conversion import placed
 from ..placing import Places, moved_raw
-from ..repair import RawMesh, warn
+from ..repair import RawMesh, warn_of_lost
 from ..sources import SceneFiles
 from .materials import COLORED, Materials
 
@@ -96,9 +96,7 @@ class _Reader:
         for error in self.stage.GetCompositionErrors():
             self.lost["composition", " ".join(str(error).split())[:200]] = None
         self._walk(self.stage.GetPseudoRoot(), np.diag([self.unit] * 3 + [1.0]))
-        if self.lost:
-            listed = ", ".join(f"{where} {what}" for where, what in self.lost)
-            warn(f"{self.files.name}: not honored: {listed}", strict)
+        warn_of_lost(self.files.name, (f"{where} {what}" for where, what in self.lost), strict)
         matrices = np.array([matrix for _, matrix in self.placed]).reshape(-1, 4, 4)
         places = Places(np.array([number for number, _ in self.placed], np.intp), matrices)
         up = str(UsdGeom.GetStageUpAxis(self.stage)).lower()
