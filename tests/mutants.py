@@ -12,7 +12,9 @@ imported already, so that a mutant costs no more than the tests that it fails:
 - `densities`: what a function named pdf or pmf returns, or what is assigned to such a name, times 1.1; and
   all of these in one class at once, so that what is returned with a sample agrees with the function.
 
-The tests of a file stand in `TESTS`; they run with -x, and `--tests` names others.
+The tests of a file stand in `TESTS`; they run with -x, and `--tests` names others. A test that fails kills a
+mutant. One with which the module cannot be imported, or the tests cannot be collected, is invalid: it
+says nothing about the tests.
 """
 
 from __future__ import annotations
@@ -123,6 +125,7 @@ TESTS |= {
         *["lights"] * ("/lights/" in file and not file.endswith(("samplers.py", "tree.py"))),
     )
 }
+UNUSABLE = 6  # status of a mutant that cannot be imported, beside those of pytest
 CONSTANTS = (bool, int, float, str, tuple, list, dict, np.generic, np.ndarray)
 DENSITY_NAMES = ("pdf", "pmf", "density", "chance", "mixed")
 
@@ -374,7 +377,7 @@ class Child:
         if self.pid:
             os.close(answer)
             return
-        status, by = 1, "cannot be imported"
+        status, by = UNUSABLE, "cannot be imported"
         try:
             os.setsid()  # its workers end with it
             quiet = os.open(os.devnull, os.O_WRONLY)
@@ -387,7 +390,10 @@ class Child:
             os._exit(0)
 
     def result(self) -> tuple[str, float, str] | None:
-        """Return what came of it, the seconds, and the first test that failed; None while it runs."""
+        """Return what came of it, the seconds, and the first test that failed; None while it runs.
+
+        A process that crashes is killed: no test can pass in it.
+        """
         seconds = time.perf_counter() - self.begin
         slow = seconds > self.limit
         if slow:
@@ -400,7 +406,8 @@ class Child:
         os.close(self.end)
         if slow:
             return "too slow", seconds, ""
-        return ("survived" if status == "0" else "killed"), seconds, by
+        known = {"0": "survived", str(int(pytest.ExitCode.TESTS_FAILED)): "killed", "": "killed"}
+        return known.get(status, "invalid"), seconds, by
 
 
 def main() -> int:
@@ -427,7 +434,8 @@ def main() -> int:
             print(f"{mutant.file}:{mutant.line}: {mutant.what}")
         print(len(mutants), "mutants")
         return 0
-    begin, counts = time.perf_counter(), {"killed": 0, "survived": 0, "too slow": 0, "not run": 0}
+    begin = time.perf_counter()
+    counts = dict.fromkeys(("killed", "survived", "too slow", "invalid", "not run"), 0)
     os.environ["HYPOTHESIS_PROFILE"] = "mutants"
     os.chdir(ROOT)
     running: list[Child] = []
