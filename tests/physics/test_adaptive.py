@@ -189,10 +189,10 @@ class Machine:
 @pytest.mark.parametrize(
     ("seconds", "per_path", "workers"), [(3.0, 3e-5, 4), (3.0, 8e-6, 1), (20.0, 8e-6, 4)]
 )
-def test_time_is_used_and_kept(seconds, per_path, workers, slower, monkeypatch):
+def test_time_is_used_and_kept(seconds, per_path, workers, slower, set_clock):
     """Within 10 %, on fast and slow machines and where speed changes on the way."""
     machine = Machine(per_path, 2e-3, workers)
-    monkeypatch.setattr(scheduler.time, "perf_counter", lambda: machine.now)
+    set_clock(lambda: machine.now)
     counts = machine.run(10_000, seconds, setup=seconds / 20, slower=slower)
     assert 0.9 * seconds <= machine.now <= (1.1 if slower > 1 else 1.02) * seconds
     assert counts.min() >= 1
@@ -242,9 +242,9 @@ def test_waves_of_a_job_are_its_samples_in_order(wave_size: int, whole_tiles: bo
     assert all(half.lanes_at_once <= max(1, job.lanes_at_once // 2) for half in halves)
 
 
-def test_every_pixel_gets_a_sample(monkeypatch) -> None:
+def test_every_pixel_gets_a_sample(set_clock) -> None:
     machine = Machine(1e-3, 1e-3, 2)
-    monkeypatch.setattr(scheduler.time, "perf_counter", lambda: machine.now)
+    set_clock(lambda: machine.now)
     assert (machine.run(500_000, 0.5) == 1).all()
 
 
@@ -289,26 +289,24 @@ def test_time_ends_waves_under_way() -> None:
 
 
 @pytest.mark.usefixtures("no_estimates")
-def test_samples_of_waves_that_time_ends_are_discarded(monkeypatch) -> None:
+def test_samples_of_waves_that_time_ends_are_discarded(calls_of) -> None:
     """What was done before is there, as if nothing else had been asked for."""
 
     def endless(tracer: tracing.Tracer, monitor: tracing.WaveMonitor, job: Job) -> JobResult:
-        if job.first_sample < 3:
+        if job.first_sample < 3 or seconds is None:
             return tracing.trace_job(tracer, monitor, job)
         while True:
             monitor.check(0, job.view.deadline)
 
-    monkeypatch.setattr(session, "trace_any_job", endless)
-    monkeypatch.setattr(scheduler, "FIRST_WAVE", 384)  # one sample of all pixels
-    monkeypatch.setattr(scheduler, "SHORT", 0.0)  # and so are all other waves
-    monkeypatch.setattr(scheduler, "LONG", np.inf)
-    image = render(lit(), None, seconds=0.5)
+    calls_of("wavefront.session.session.trace_any_job", endless)
+    seconds = 0.5
+    image = render(lit(), None, seconds=seconds, wave_size=384)  # one sample of all pixels
     assert image.spp <= 3
-    monkeypatch.undo()
+    seconds = None
     assert (image.rgb == render(lit(), image.spp).rgb).all()
 
 
-def test_pixels_without_a_sample_are_told(monkeypatch) -> None:
+def test_pixels_without_a_sample_are_told(calls_of) -> None:
     first_is_done = threading.Event()
 
     def endless_after_the_first(tracer: tracing.Tracer, monitor: tracing.WaveMonitor, job: Job) -> JobResult:
@@ -318,20 +316,20 @@ def test_pixels_without_a_sample_are_told(monkeypatch) -> None:
         while True:
             monitor.check(123, job.view.deadline)
 
-    monkeypatch.setattr(session, "trace_any_job", endless_after_the_first)
-    monkeypatch.setattr(scheduler, "FIRST_WAVE", 100)
+    calls_of("wavefront.session.session.trace_any_job", endless_after_the_first)
     message = (
         r"288 pixels of 384 have no sample and are black: when seconds=0.5 were over, .* met 123 surfaces"
     )
+    settings = {"workers": 1, "wave_size": 100, "progress": lambda *_: first_is_done.set()}
     with pytest.warns(UserWarning, match=message):
-        image = render(lit(), None, seconds=0.5, workers=1, progress=lambda *_: first_is_done.set())
+        image = render(lit(), None, seconds=0.5, **settings)
     assert (image.counts == 0).sum() == 288
     assert (image.rgb[image.counts == 0] == 0).all()
 
 
 def test_paths_that_do_not_end_are_told(monkeypatch) -> None:
     """Once, where more than 1 000 bounces are allowed, and more than 1 000 surfaces met."""
-    assert outcome.LONG_PATH == 1000
+    assert outcome.LONG_PATH == 1000  # takes seconds
     monkeypatch.setattr(session, "LONG_PATH", 50)
     monkeypatch.setattr(outcome, "LONG_PATH", 50)
     with pytest.warns(UserWarning, match=r"more than 50 surfaces.*max_bounces=60.*absorb") as caught:

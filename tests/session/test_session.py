@@ -8,6 +8,7 @@ import signal
 import sys
 import threading
 import time
+from typing import Any
 
 import numpy as np
 import pytest
@@ -17,9 +18,7 @@ from scripts import children, end_of, eventually, runs, script, wait_for
 import wavefront as wf
 from wavefront.core.shared import SharedInt
 from wavefront.scheduling import pool
-from wavefront.session import prepared_scene
 from wavefront.session import session as module
-from wavefront.session.camera_render import CameraRender
 
 LINUX = sys.platform.startswith("linux")
 needs_fork = pytest.mark.skipif(not LINUX, reason="needs fork")
@@ -123,15 +122,11 @@ def patient(monkeypatch: pytest.MonkeyPatch) -> None:
 @pytest.mark.parametrize("executor", EXECUTORS)
 @pytest.mark.parametrize("sampler", ["sobol", "bluenoise"])
 @pytest.mark.first(1)
-def test_another_camera_compiles_nothing_and_starts_no_worker(executor, sampler, monkeypatch):
+def test_another_camera_compiles_nothing_and_starts_no_worker(executor, sampler, calls_of):
     """Its picture is that of a render, also in another size, and when the first one was not finished."""
     options = {"sampler": sampler, "workers": 2, "executor": executor, "wave_size": 300, **QUIET}
     plain = [wf.render(everything(), 6, camera=view(x, size), **options) for x, size in VIEWS]
-    compiled = []
-    compile_scene = prepared_scene.compile_scene
-    monkeypatch.setattr(
-        prepared_scene, "compile_scene", lambda *a, **k: compiled.append(1) or compile_scene(*a, **k)
-    )
+    compiled = calls_of("wavefront.session.prepared_scene.compile_scene")
     with wf.Session(everything(), 6, camera=view(0), **options) as session:
         next(session)
         workers = {each.pid for each in multiprocessing.active_children()}
@@ -143,7 +138,7 @@ def test_another_camera_compiles_nothing_and_starts_no_worker(executor, sampler,
         assert threads <= worker_threads()  # a pool of threads starts the second when it is needed
         assert len(worker_threads()) <= (2 if executor == "threads" else 0)
         assert len(workers) == (2 if executor == "processes" else 0)
-    assert compiled == [1]
+    assert len(compiled) == 1
 
 
 def worker_threads() -> set[threading.Thread]:
@@ -171,10 +166,10 @@ def test_bad_cameras_leave_the_session_as_it_is() -> None:
         assert same(session.run(), wf.render(everything(), 4, **QUIET))
 
 
-def test_time_begins_anew_with_another_camera(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_time_begins_anew_with_another_camera(set_clock: Any) -> None:
     """The limit is for one picture; workers that were started hear of the new deadline."""
     clock = SharedInt()  # milliseconds; workers have it, too
-    monkeypatch.setattr(time, "perf_counter", lambda: clock.value / 1000)
+    set_clock(lambda: clock.value / 1000)
     options = {"seconds": 0.4, "workers": 2, "executor": "processes" if LINUX else "threads"}
     options |= {"wave_size": 300, "progress": lambda *_: clock.rise_to(clock.value + 20)}
     with wf.Session(everything(), **options) as session:
@@ -234,10 +229,10 @@ def test_stop_before_there_is_a_picture() -> None:
             session.run()
 
 
-def test_drop_ends_a_render_without_a_picture(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_drop_ends_a_render_without_a_picture(fails: Any) -> None:
     with wf.Session(everything(), 10_000_000, workers=2, wave_size=2000, **QUIET) as session:
         images = [next(session)]
-        monkeypatch.setattr(CameraRender, "last_image", None)  # is not called
+        fails("wavefront.session.camera_render.CameraRender.last_image", AssertionError())
         timer = threading.Timer(0.3, session.drop)
         timer.start()
         images.extend(session)

@@ -17,9 +17,10 @@ import urllib.error
 import urllib.request
 from collections.abc import Iterator
 from contextlib import suppress
+from importlib.machinery import ModuleSpec
 from itertools import pairwise
 from pathlib import Path
-from types import SimpleNamespace
+from types import ModuleType, SimpleNamespace
 from typing import Any, cast
 from urllib.parse import urlsplit
 
@@ -29,7 +30,7 @@ import pytest
 from scripts import SOON, eventually
 
 import wavefront as wf
-from wavefront.cli import main, view_commands
+from wavefront.cli import main
 from wavefront.viewer import background_denoiser as denoiser_module
 from wavefront.viewer import page as page_module
 from wavefront.viewer import refiner as module
@@ -740,8 +741,9 @@ def slow_filter(monkeypatch: pytest.MonkeyPatch) -> Iterator[tuple[list[wf.Image
         return wf.Image(2 * image.rgb, image.spp, image.metadata, layers=image.layers)
 
     monkeypatch.setattr(wf.Image, "denoise", denoise)
-    monkeypatch.setattr(denoiser_module, "is_quick", lambda: True)
-    monkeypatch.setattr(page_module, "is_quick", lambda: True)
+    quick = ModuleType("pyoidn")
+    quick.__spec__ = ModuleSpec("pyoidn", None)
+    monkeypatch.setitem(sys.modules, "pyoidn", quick)
     yield given, go
     go.release(1000)
 
@@ -778,15 +780,18 @@ def test_few_samples_are_shown_denoised_where_that_is_quick(sent: Any, slow_filt
     assert given == [few]
 
 
-def test_a_slow_denoiser_is_a_process_that_another_view_ends(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_slow_denoiser_is_a_process_that_another_view_ends(
+    missing: Any, monkeypatch: pytest.MonkeyPatch
+) -> None:
     """It gives what `denoise` does. Nothing is left of it."""
-    monkeypatch.setattr(denoiser_module, "is_quick", lambda: False)
+    first, second = ViewerFrame(looks(), CAMERA, True), ViewerFrame(looks(1), CAMERA.resized((8, 8)), True)
+    expected = second.image.denoise()
+    missing("pyoidn")  # here, not in the process
     done: list[tuple[ViewerFrame, wf.Image]] = []
     errors: list[Exception] = []
     denoiser = denoiser_module.BackgroundDenoiser(
         lambda frame, image: done.append((frame, image)), errors.append
     )
-    first, second = ViewerFrame(looks(), CAMERA, True), ViewerFrame(looks(1), CAMERA.resized((8, 8)), True)
     denoiser.want(first)
     assert eventually(lambda: denoiser._process is not None)
     process = denoiser._process
@@ -796,7 +801,7 @@ def test_a_slow_denoiser_is_a_process_that_another_view_ends(monkeypatch: pytest
     assert process.returncode < 0
     ((frame, image),) = done
     assert frame is second
-    assert image.rgb.tobytes() == second.image.denoise().rgb.tobytes()
+    assert image.rgb.tobytes() == expected.rgb.tobytes()
     monkeypatch.setattr(denoiser_module, "COMMAND", "raise OSError('no room')")
     denoiser.want(first)
     assert eventually(lambda: errors)
@@ -962,11 +967,10 @@ def test_the_command_ends_at_ctrl_c(tmp_path: Path) -> None:
     assert "Traceback" not in errors
 
 
-def test_the_command_has_a_token_unless_told(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+def test_the_command_has_a_token_unless_told(calls_of: Any, tmp_path: Path) -> None:
     mesh = tmp_path / "triangle.obj"
     mesh.write_text("v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n")
-    tokens: list[Any] = []
-    monkeypatch.setattr(view_commands, "view", lambda scene, **settings: tokens.append(settings["token"]))
+    views = calls_of("wavefront.cli.view_commands.view", lambda scene, **settings: None)
     for words in ([], ["--token", "mine"], ["--no-token"]):
         assert main(["view", str(mesh), *words]) == 0
-    assert tokens == [True, "mine", False]
+    assert [view.named["token"] for view in views] == [True, "mine", False]
