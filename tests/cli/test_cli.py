@@ -63,14 +63,13 @@ def fast(tmp_path):
     return output, ["-o", str(output), "--spp", "2", "--size", "8x6", "--quiet"]
 
 
+RENDER = "wavefront.cli.render_command.render_by_command"
+
+
 @pytest.fixture
-def no_render(monkeypatch):
+def no_render(fails):
     """Fail the test when a render begins."""
-
-    def refuse(*args, **kwargs):
-        pytest.fail("rendered before the mistake was reported")
-
-    monkeypatch.setattr(render_command, "render_by_command", refuse)
+    fails(RENDER, pytest.fail.Exception("rendered before the mistake was reported"))
 
 
 def error_of(capsys, arguments):
@@ -346,13 +345,10 @@ def test_no_command_is_an_error(capsys):
     assert "arguments are required: command; see wavefront --help" in error_of(capsys, [])
 
 
-def test_ctrl_c_while_loading_gives_130(obj, fast, monkeypatch):
-    def interrupt(path, options, progress):
-        assert progress is False  # as --quiet asks
-        raise KeyboardInterrupt
-
-    monkeypatch.setattr(render_command, "read_scene", interrupt)
+def test_ctrl_c_while_loading_gives_130(obj, fast, fails):
+    calls = fails("wavefront.cli.render_command.read_scene", KeyboardInterrupt())
     assert main(["render", obj, *fast[1]]) == 130
+    assert calls[0].args[-1] is False  # no progress, as --quiet asks
 
 
 @pytest.mark.parametrize(
@@ -360,14 +356,14 @@ def test_ctrl_c_while_loading_gives_130(obj, fast, monkeypatch):
     [(wf.Interrupted, 130, "wavefront: stopped"), (wf.RenderError, 2, "wavefront: error: stopped")],
 )
 @pytest.mark.parametrize("begun", [True, False])
-def test_a_render_that_stops_is_saved(obj, fast, monkeypatch, capsys, error, status, message, begun):
+def test_a_render_that_stops_is_saved(obj, fast, calls_of, capsys, error, status, message, begun):
     output, options = fast
     render = render_command.render_by_command
 
     def stopped(*args, **kwargs):
         raise error("stopped", render(*args, **kwargs) if begun else None)
 
-    monkeypatch.setattr(render_command, "render_by_command", stopped)
+    calls_of(RENDER, stopped)
     assert main(["render", obj, *options]) == status
     assert message in capsys.readouterr().err
     assert output.exists() == begun
@@ -382,24 +378,30 @@ def saved_instead(capsys):
     return error, note
 
 
-def broken_after_the_render(monkeypatch, act):
-    """Let something happen between the render and saving."""
+@pytest.fixture
+def broken_after_the_render(calls_of):
+    """Return a function that lets something happen between the render and saving."""
     render = render_command.render_by_command
 
-    def render_then_act(*args, **kwargs):
-        image = render(*args, **kwargs)
-        act()
-        return image
+    def break_by(act):
+        def render_then_act(*args, **kwargs):
+            image = render(*args, **kwargs)
+            act()
+            return image
 
-    monkeypatch.setattr(render_command, "render_by_command", render_then_act)
+        calls_of(RENDER, render_then_act)
+
+    return break_by
 
 
-def test_a_picture_whose_folder_has_gone_is_saved_in_the_current_one(obj, tmp_path, capsys, monkeypatch):
+def test_a_picture_whose_folder_has_gone_is_saved_in_the_current_one(
+    obj, tmp_path, capsys, monkeypatch, broken_after_the_render
+):
     here, there = tmp_path / "here", tmp_path / "there"
     here.mkdir()
     there.mkdir()
     monkeypatch.chdir(here)
-    broken_after_the_render(monkeypatch, there.rmdir)
+    broken_after_the_render(there.rmdir)
     for count in range(2):
         there.mkdir(exist_ok=True)
         options = ["-o", str(there / "p.png"), "--spp", "1", "--size", "8x6", "--quiet", "--origin", "0,1,4"]
@@ -411,9 +413,11 @@ def test_a_picture_whose_folder_has_gone_is_saved_in_the_current_one(obj, tmp_pa
         assert iio.imread(name).shape == (6, 8, 3)
 
 
-def test_a_picture_in_whose_place_is_something_else_is_saved_beside_it(obj, fast, capsys, monkeypatch):
+def test_a_picture_in_whose_place_is_something_else_is_saved_beside_it(
+    obj, fast, capsys, broken_after_the_render
+):
     output, options = fast
-    broken_after_the_render(monkeypatch, output.mkdir)
+    broken_after_the_render(output.mkdir)
     assert main(["render", obj, *options]) == 2
     error, note = saved_instead(capsys)
     assert "is a folder" in error
@@ -421,11 +425,8 @@ def test_a_picture_in_whose_place_is_something_else_is_saved_beside_it(obj, fast
     assert np.load(output.with_name("picture-saved.npy")).shape == (6, 8, 3)
 
 
-def test_a_picture_that_its_format_cannot_hold_is_saved_in_another(obj, tmp_path, capsys, monkeypatch):
-    def refuse(*args, **kwargs):
-        raise OSError("encoder error -2")
-
-    monkeypatch.setattr("wavefront.codecs.png_jpeg.encode", refuse)
+def test_a_picture_that_its_format_cannot_hold_is_saved_in_another(obj, tmp_path, capsys, fails):
+    fails("wavefront.codecs.png_jpeg.encode", OSError("encoder error -2"))
     options = ["-o", str(tmp_path / "p.jpg"), "--spp", "1", "--size", "8x6", "--quiet", "--origin", "0,1,4"]
     assert main(["render", obj, *options, "--tone", "agx"]) == 2
     error, note = saved_instead(capsys)
@@ -434,15 +435,14 @@ def test_a_picture_that_its_format_cannot_hold_is_saved_in_another(obj, tmp_path
     assert wf.Image.load(tmp_path / "p-saved.npz").variance is not None
 
 
-def test_a_picture_that_can_be_saved_nowhere_is_said_to_be_lost(obj, fast, capsys, monkeypatch):
-    def refuse(*args):
-        raise wf.SaveError("no space left")
-
-    broken_after_the_render(
-        monkeypatch, lambda: monkeypatch.setattr("wavefront.codecs.images.write_bytes", refuse)
-    )
+def test_a_picture_that_can_be_saved_nowhere_is_said_to_be_lost(
+    obj, fast, capsys, broken_after_the_render, full_disk
+):
+    broken_after_the_render(full_disk)
     assert main(["render", obj, *fast[1]]) == 2
-    assert saved_instead(capsys) == ("wavefront: error: no space left", "wavefront: the picture is lost")
+    error, note = saved_instead(capsys)
+    assert "No space left" in error
+    assert note == "wavefront: the picture is lost"
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="POSIX signals")

@@ -15,7 +15,7 @@ import pytest
 
 import wavefront as wf
 from wavefront import cli
-from wavefront.cli import command_line, doctor_command, render_command, view_commands
+from wavefront.cli import doctor_command
 from wavefront.cli.doctor_command import EXTRAS
 from wavefront.cli.options import joined
 
@@ -125,11 +125,8 @@ def test_errors_are_one_line_and_give_2(mesh, run, arguments, message) -> None:
         (wf.Interrupted("stopped by Ctrl-C"), 130, "stopped by Ctrl-C"),
     ],
 )
-def test_how_renders_fail_in_any_command(mesh, monkeypatch, capsys, error, status, text) -> None:
-    def fail(*args: object, **settings: object) -> None:
-        raise error
-
-    monkeypatch.setattr(view_commands, "save_animation", fail)
+def test_how_renders_fail_in_any_command(mesh, fails, capsys, error, status, text) -> None:
+    fails("wavefront.cli.view_commands.save_animation", error)
     assert cli.main(["turntable", str(mesh), "-o", str(mesh.with_suffix(".gif")), *FAST]) == status
     assert capsys.readouterr().err == f"wavefront: {text}\n"
 
@@ -174,15 +171,13 @@ def test_where_several_pictures_cannot_go(scenes, options, message, tmp_path, mo
     assert message in capsys.readouterr().err
 
 
-def test_a_scene_is_shown_with_the_options_of_a_render(mesh: Path, monkeypatch, capsys) -> None:
-    shown = []
-    monkeypatch.setattr(
-        render_command, "view", lambda scene, **settings: shown.append((settings["camera"], settings))
-    )
+def test_a_scene_is_shown_with_the_options_of_a_render(mesh: Path, calls_of, monkeypatch, capsys) -> None:
+    shown = calls_of("wavefront.cli.render_command.view", lambda scene, **settings: None)
     monkeypatch.chdir(mesh.parent)
     words = ["render", mesh.name, "--show", "--origin", "3,3,3", "--seed", "7", *FAST]
     assert cli.main(words) == 0
-    ((camera, settings),) = shown
+    (call,) = shown
+    camera, settings = call.named["camera"], call.named
     assert camera.origin.tolist() == [3, 3, 3]
     assert camera.size == (16, 12)
     assert (settings["seed"], settings["lighting"], settings["block"]) == (7, "even", True)
@@ -253,8 +248,8 @@ def test_completion_prints_a_script(shell: str, run, tmp_path: Path) -> None:
         assert found.stdout == "turntable\n"
 
 
-def test_completion_says_what_it_needs(monkeypatch, capsys) -> None:
-    monkeypatch.setattr(command_line, "find_spec", lambda name: None)
+def test_completion_says_what_it_needs(missing, capsys) -> None:
+    missing("shtab")
     assert cli.main(["completion", "bash"]) == 2
     assert capsys.readouterr().err == "wavefront: error: completion needs pip install shtab\n"
 
@@ -279,11 +274,11 @@ def test_the_room_is_as_described() -> None:
     assert sum(shape.emission is not None for shape in scene.shapes) == 1
 
 
-def test_doctor_gives_1_when_a_test_fails(monkeypatch, capsys) -> None:
+def test_doctor_gives_1_when_a_test_fails(monkeypatch, calls_of, capsys) -> None:
     gray = wf.Diffuse(0.99)
     monkeypatch.setattr(doctor_command, "Diffuse", lambda reflectance: gray)
     assert not doctor_command.check_furnace().passed
-    monkeypatch.setattr(doctor_command, "measure_speeds", lambda seconds, workers: [])
+    calls_of("wavefront.cli.doctor_command.measure_speeds", lambda seconds, workers: [])
     assert cli.main(["doctor"]) == 1
     assert "  FAILED  furnace: a white sphere" in capsys.readouterr().out
 

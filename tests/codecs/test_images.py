@@ -172,15 +172,11 @@ def test_refuses_shapes(tmp_path, shape):
         write_image(tmp_path / "a.png", np.zeros(shape))
 
 
-def test_a_failed_write_keeps_the_old_file(tmp_path, picture, monkeypatch, scratch):
+def test_a_failed_write_keeps_the_old_file(tmp_path, picture, full_disk, scratch):
     path = tmp_path / "a.npy"
     write_image(path, picture)
     before = path.read_bytes()
-
-    def no_space(handle):
-        raise OSError(28, "No space left on device")
-
-    monkeypatch.setattr(files.os, "fsync", no_space)
+    full_disk()
     with pytest.raises(SaveError, match=r"a\.npy: cannot be written: .*No space left"):
         write_image(path, picture * 2)
     assert path.read_bytes() == before
@@ -278,36 +274,23 @@ def test_what_is_no_path_is_refused(picture, path):
 
 
 @posix
-def test_a_folder_that_cannot_be_read_is_written_to(tmp_path, picture, monkeypatch):
-    open_file = os.open
-
-    def refuse(path, flags, *args, **kwargs):
-        if flags == os.O_RDONLY:
-            raise PermissionError(13, "Permission denied", path)
-        return open_file(path, flags, *args, **kwargs)
-
-    monkeypatch.setattr(files.os, "open", refuse)
+def test_a_folder_that_cannot_be_read_is_written_to(tmp_path, picture, fails):
+    denied = PermissionError(13, "Permission denied")
+    fails("os.open", denied, lambda path, flags, *args, **named: flags == os.O_RDONLY)
     write_image(tmp_path / "a.npy", picture)
     assert np.array_equal(np.load(tmp_path / "a.npy"), picture)
 
 
-def test_a_read_only_file_system_is_a_save_error(tmp_path, picture, monkeypatch):
+def test_a_read_only_file_system_is_a_save_error(tmp_path, picture, fails):
     """Also one that becomes so after the check."""
-
-    def refuse(path, flags, *args, **kwargs):
-        raise OSError(30, "Read-only file system", path)
-
-    monkeypatch.setattr(files.os, "open", refuse)
+    fails("os.open", OSError(30, "Read-only file system"))
     with pytest.raises(SaveError, match=r"a\.png: cannot be written: .*Read-only file system"):
         write_image(tmp_path / "a.png", picture)
 
 
 @posix
-def test_files_without_names_that_cannot_be_named_do_not_matter(tmp_path, picture, monkeypatch):
-    def refuse(*args, **kwargs):
-        raise PermissionError(1, "Operation not permitted")
-
-    monkeypatch.setattr(files.os, "link", refuse)
+def test_files_without_names_that_cannot_be_named_do_not_matter(tmp_path, picture, fails):
+    fails("os.link", PermissionError(1, "Operation not permitted"))
     write_image(tmp_path / "a.npy", picture)
     assert np.array_equal(np.load(tmp_path / "a.npy"), picture)
     assert [p.name for p in tmp_path.iterdir()] == ["a.npy"]

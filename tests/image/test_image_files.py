@@ -440,8 +440,8 @@ def claiming(path, sizes):
         ),
     ],
 )
-def test_an_archive_that_claims_too_much_is_refused_before_it_is_read(tmp_path, monkeypatch, sizes, message):
-    monkeypatch.setattr("wavefront.codecs.npz._read", None)
+def test_an_archive_that_claims_too_much_is_refused_before_it_is_read(tmp_path, fails, sizes, message):
+    fails("wavefront.codecs.npz._read", AssertionError("is read"))
     claiming(tmp_path / "a.npz", sizes)
     with pytest.raises(wf.SceneError, match=rf"a\.npz: {message}"):
         wf.Image.load(tmp_path / "a.npz")
@@ -559,11 +559,8 @@ while True:
 )
 
 
-def test_errors_of_writing_name_no_file_but_the_users(tmp_path, monkeypatch):
-    def refuse(source, target):
-        raise PermissionError(13, "Permission denied", source, None, target)
-
-    monkeypatch.setattr(os, "replace", refuse)
+def test_errors_of_writing_name_no_file_but_the_users(tmp_path, fails):
+    fails("os.replace", PermissionError(13, "Permission denied", "scratch", None, "a.png"))
     with pytest.raises(wf.SaveError, match=r"a\.png: cannot be written: Permission denied$"):
         with_everything().save(tmp_path / "a.png")
     assert not list(tmp_path.iterdir())

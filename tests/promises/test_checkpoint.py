@@ -2,11 +2,9 @@
 
 from __future__ import annotations
 
-import errno
 import hashlib
 import json
 import os
-import pickle
 import random
 import signal
 import subprocess
@@ -27,7 +25,6 @@ import scenes
 import wavefront as wf
 from wavefront import cli
 from wavefront.camera import Sensors
-from wavefront.core import files
 from wavefront.core.npz import npz_chunks
 from wavefront.film import checkpoint
 from wavefront.film.checkpoint import HEADER, read_header
@@ -161,16 +158,16 @@ def test_a_finished_render_returns_at_once(tmp_path: Path) -> None:
 class Clock:
     """Stands for `time.perf_counter`; it goes on with each job of a render that has it for `progress`."""
 
-    def __init__(self, monkeypatch: pytest.MonkeyPatch, step: float) -> None:
+    def __init__(self, set_clock: Any, step: float) -> None:
         self.now, self.step = 1000.0, step
-        monkeypatch.setattr(time, "perf_counter", lambda: self.now)
+        set_clock(lambda: self.now)
 
     def __call__(self, done: float, total: float) -> None:
         self.now += self.step
 
 
-def test_seconds_are_those_of_all_parts(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    clock = Clock(monkeypatch, 0.02)
+def test_seconds_are_those_of_all_parts(tmp_path: Path, set_clock: Any) -> None:
+    clock = Clock(set_clock, 0.02)
     settings: dict[str, Any] = {
         "checkpoint": tmp_path / "a",
         "progress": clock,
@@ -226,10 +223,10 @@ def test_parts_of_the_samples_have_checkpoints_that_merge(tmp_path: Path) -> Non
     assert merged.rgb.tobytes() == wf.render(scene(), 11).rgb.tobytes()
 
 
-def test_the_file_is_written_at_the_interval(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_the_file_is_written_at_the_interval(tmp_path: Path, set_clock: Any) -> None:
     """While the render goes on; at first at the end of the first interval."""
     path, seen = tmp_path / "a", []
-    clock = Clock(monkeypatch, 0.02)
+    clock = Clock(set_clock, 0.02)
 
     def progress(done: float, total: float) -> None:
         seen.append(path.exists())
@@ -421,7 +418,7 @@ def test_a_damaged_file_is_neither_used_nor_replaced(content: bytes, tmp_path: P
 
 
 @pytest.mark.skipif(not sys.platform.startswith("linux"), reason="open files of Linux")
-def test_a_file_is_on_the_disk_before_it_takes_its_place(tmp_path, monkeypatch):
+def test_a_file_is_on_the_disk_before_it_takes_its_place(tmp_path, calls_of):
     """A temporary file is written and flushed, renamed, and then the folder is flushed."""
     steps: list[str] = []
     flush, rename = os.fsync, os.replace
@@ -435,8 +432,8 @@ def test_a_file_is_on_the_disk_before_it_takes_its_place(tmp_path, monkeypatch):
         steps.append("replace")
         rename(source, target)
 
-    monkeypatch.setattr(files.os, "fsync", fsync)
-    monkeypatch.setattr(files.os, "replace", replace)
+    calls_of("os.fsync", fsync)
+    calls_of("os.replace", replace)
     wf.render(scene(), 1, checkpoint=tmp_path / "a")
     assert steps == ["file", "replace", "folder"]
 
@@ -570,29 +567,21 @@ def test_a_checkpoint_is_an_archive_of_numpy(tmp_path: Path) -> None:
     assert zipfile.ZipFile(tmp_path / "a.wfck").testzip() is None
 
 
-def test_nothing_of_a_file_is_unpickled(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_nothing_of_a_file_is_unpickled(tmp_path: Path, fails: Any) -> None:
     path, settings = tmp_path / "a", {"workers": 1, "executor": "threads"}
     wf.render(scene(), 1, checkpoint=path, **settings)
-
-    def refused(*args: Any, **named: Any) -> None:
-        raise AssertionError("something was unpickled")
-
     for name in ("load", "loads", "Unpickler"):
-        monkeypatch.setattr(pickle, name, refused)
+        fails(f"pickle.{name}", AssertionError("something was unpickled"))
     assert wf.render(scene(), 2, checkpoint=path, **settings).spp == 2
     assert wf.Image.load(path).spp == 2
 
 
-def test_a_full_disk_leaves_the_old_file_and_the_picture(tmp_path, monkeypatch):
+def test_a_full_disk_leaves_the_old_file_and_the_picture(tmp_path, monkeypatch, full_disk):
     """An error at the end carries the picture; before, a warning is enough, for there may be space later."""
     path = tmp_path / "a"
     wf.render(scene(), 2, checkpoint=path)
     content = path.read_bytes()
-
-    def full(*args: Any) -> None:
-        raise OSError(errno.ENOSPC, "No space left on device")
-
-    monkeypatch.setattr(files.os, "fsync", full)
+    full_disk()
     settings: dict[str, Any] = {"checkpoint": path, "checkpoint_interval": 1e-3, "wave_size": 200}
     with (
         pytest.warns(UserWarning, match="the checkpoint was not written, and will be tried again") as warned,
@@ -733,18 +722,13 @@ def test_signals_keep_the_render(command, tmp_path, number, status, background):
     assert so_far.rgb.tobytes() == kept.rgb.tobytes()
 
 
-def test_a_full_disk_is_not_status_0(command, tmp_path, monkeypatch, capsys):
+def test_a_full_disk_is_not_status_0(command, tmp_path, monkeypatch, capsys, fails):
     monkeypatch.chdir(tmp_path)
     command[command.index("240")], command[-1] = "4", "3600"
-    monkeypatch.setattr("wavefront.film.checkpoint.write_chunks", refuse)
+    fails("wavefront.film.checkpoint.write_chunks", wf.SaveError("no space"))
     assert cli.main(command) == 2
     assert "error: the checkpoint was not written: no space" in capsys.readouterr().err
     assert (tmp_path / "out.npy").exists()
-
-
-def refuse(*args: Any) -> None:
-    """Write nothing."""
-    raise wf.SaveError("no space")
 
 
 def test_resume_gives_the_command_again(command, tmp_path, monkeypatch, capsys):

@@ -10,7 +10,7 @@ import sys
 import time
 import warnings
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, redirect_stdout
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
@@ -99,11 +99,10 @@ def test_a_warning_that_cannot_be_shown_is_lost(make: Callable[[], object]) -> N
 
 
 @mute_files
-def test_the_command_writes_its_picture(make, tmp_path, monkeypatch):
+def test_the_command_writes_its_picture(make, tmp_path):
     scene, output = tmp_path / "triangle.obj", tmp_path / "out.png"
     scene.write_text(TRIANGLE)
-    with mute(make):
-        monkeypatch.setattr(sys, "stdout", sys.stderr)
+    with mute(make), redirect_stdout(sys.stderr):
         done = cli.main(["render", str(scene), "--size", "16x16", "--spp", "1", "-o", str(output)])
         failed = cli.main(["render", str(tmp_path / "none.obj"), "-o", str(output)])
     assert (done, failed) == (0, 2)
@@ -128,11 +127,11 @@ def test_a_notebook_that_shows_nothing_ends_no_render(monkeypatch: pytest.Monkey
     monkeypatch.setitem(sys.modules, "IPython", SimpleNamespace(get_ipython=lambda: shell))
     monkeypatch.setitem(sys.modules, "IPython.display", SimpleNamespace(display=fail))
     shown = notebook.LivePicture()
-    monkeypatch.setattr(shown, "_next", 0.0)
+    shown._next = 0.0
     image = wf.Image([[[1.0, 1.0, 1.0]]])
     shown.refine(image)
     shown._handle = SimpleNamespace(update=fail)
-    monkeypatch.setattr(shown, "_next", 0.0)
+    shown._next = 0.0
     shown.refine(image)
     shown.end(wf.Image([[[1.0, 1.0, 1.0]]]))
     stopped = wf.Interrupted("stopped", image)

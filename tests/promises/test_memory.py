@@ -4,14 +4,14 @@ from __future__ import annotations
 
 import subprocess
 import sys
+from itertools import count
+from typing import Any
 
 import pytest
 import scenes
 
 import wavefront as wf
 from wavefront.core.memory import available_memory, check_memory
-from wavefront.scheduling.accumulator import Accumulator
-from wavefront.session import prepared_scene
 
 linux = pytest.mark.skipif(not sys.platform.startswith("linux"), reason="limits of Linux")
 
@@ -75,27 +75,20 @@ def test_memory_that_is_there_is_not_refused() -> None:
         check_memory("all", 10**21)
 
 
-def test_the_picture_so_far_is_kept_when_memory_runs_out(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(Accumulator, "add", fail_after(Accumulator.add, 4))
+def test_the_picture_so_far_is_kept_when_memory_runs_out(fails: Any) -> None:
+    calls = count()
+    fails(
+        "wavefront.scheduling.accumulator.Accumulator.add",
+        MemoryError("no room"),
+        lambda *given, **options: next(calls) >= 4,
+    )
     with pytest.raises(wf.RenderError, match="out of memory: no room; use fewer workers") as caught:
         wf.render(scenes.everything(), 64, wave_size=300, workers=1, progress=False)
     assert 0 < caught.value.image.metadata["samples"] <= 4 * 300
 
 
-def test_no_memory_for_the_scene_is_an_error_without_a_picture(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(prepared_scene, "compile_scene", fail_after(abs, 0))
+def test_no_memory_for_the_scene_is_an_error_without_a_picture(fails: Any) -> None:
+    fails("wavefront.session.prepared_scene.compile_scene", MemoryError("no room"))
     with pytest.raises(wf.RenderError, match="out of memory while the scene was set up: no room") as caught:
         wf.render(scenes.everything(), 1, progress=False)
     assert caught.value.image is None
-
-
-def fail_after(function, calls: int):
-    """Return the function, which finds no memory after so many calls."""
-    count = iter(range(calls))
-
-    def limited(*given, **options):
-        if next(count, None) is None:
-            raise MemoryError("no room")
-        return function(*given, **options)
-
-    return limited

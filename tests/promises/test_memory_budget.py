@@ -55,9 +55,15 @@ def test_other_sizes_are_refused_before_work(value: Any) -> None:
         wf.render("no such file", max_memory=value)
 
 
-def test_memory_sizes_waves_first_and_then_workers(monkeypatch: pytest.MonkeyPatch) -> None:
-    """With much memory waves are as large as pays; with little there are fewer workers, then small waves."""
+@pytest.fixture
+def in_use(monkeypatch: pytest.MonkeyPatch) -> int:
+    """Return the bytes that this process has in use."""
     monkeypatch.setattr(budget, "resident_memory", lambda: 100 * MEGABYTE)
+    return 100 * MEGABYTE
+
+
+def test_memory_sizes_waves_first_and_then_workers(in_use: int) -> None:
+    """With much memory waves are as large as pays; with little there are fewer workers, then small waves."""
     free = make_budget(None, (640, 480), 4, None, processes=True)
     assert (free.workers, free.wave_size) == (4, LARGE_WAVE)
     ample = make_budget(10**12, (640, 480), 4, None, processes=True)
@@ -67,7 +73,7 @@ def test_memory_sizes_waves_first_and_then_workers(monkeypatch: pytest.MonkeyPat
     for megabytes in range(2000, 300, -20):
         found = make_budget(megabytes * MEGABYTE, (640, 480), 4, None, processes=True)
         used = found.workers * (PROCESS_BYTES + found.wave_size * LANE_BYTES)
-        assert 100 * MEGABYTE + picture_memory((640, 480)) + used <= megabytes * MEGABYTE
+        assert in_use + picture_memory((640, 480)) + used <= megabytes * MEGABYTE
         assert found.workers <= before.workers
         assert found.workers < before.workers or found.wave_size <= before.wave_size
         before = found
@@ -89,9 +95,8 @@ def test_what_cannot_fit_is_refused_with_the_figures() -> None:
         wf.render(scene, 1, max_memory="1GB")
 
 
-def test_layers_count(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(budget, "resident_memory", lambda: 100 * MEGABYTE)
-    limit = 100 * MEGABYTE + picture_memory((640, 480)) + PROCESS_BYTES + 40 * MEGABYTE
+def test_layers_count(in_use: int) -> None:
+    limit = in_use + picture_memory((640, 480)) + PROCESS_BYTES + 40 * MEGABYTE
     plain, layered = (
         make_budget(limit, (640, 480), 1, None, True, layers) for layers in ((), ("direct", "indirect"))
     )
@@ -100,9 +105,8 @@ def test_layers_count(monkeypatch: pytest.MonkeyPatch) -> None:
         wf.render(scenes.everything(), 1, size=(2000, 1500), max_memory="1.1GB", aovs="all", progress=False)
 
 
-def test_the_least_memory_that_is_named_is_enough(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(budget, "resident_memory", lambda: 0)
-    least = picture_memory((64, 64)) + THREAD_BYTES + LEAST_WAVE * LANE_BYTES
+def test_the_least_memory_that_is_named_is_enough(in_use: int) -> None:
+    least = in_use + picture_memory((64, 64)) + THREAD_BYTES + LEAST_WAVE * LANE_BYTES
     found = make_budget(least, (64, 64), 8, None, processes=False)
     assert (found.workers, found.wave_size) == (1, LEAST_WAVE)
     with pytest.raises(wf.SceneError, match="are needed"):
