@@ -2,6 +2,7 @@
 
 import errno
 import gc
+import inspect
 import os
 import pkgutil
 import signal
@@ -200,6 +201,23 @@ def no_estimates(monkeypatch: pytest.MonkeyPatch) -> None:
         return scheduler._seconds is not None and scheduler.elapsed > scheduler._seconds
 
     monkeypatch.setattr(Scheduler, "_late", late)
+
+
+@pytest.fixture
+def principled_recorded(calls_of: Callable[..., list[Call]]) -> None:
+    """Let `Principled` of a file be a material that has its parameters, as they were given, in `given`."""
+    import wavefront as wf
+
+    signature = inspect.signature(wf.Principled)
+
+    class Recorder(wf.Diffuse):
+        def __init__(self, **given: Any) -> None:
+            bound = signature.bind(**given)
+            bound.apply_defaults()
+            self.given = bound.arguments
+            super().__init__(0.5)
+
+    calls_of("wavefront.io.appearance.Principled", Recorder)
 
 
 @pytest.fixture

@@ -12,7 +12,6 @@ import trimesh
 from significance import render
 
 import wavefront as wf
-from wavefront.accel import cache as keep
 from wavefront.accel import make_accelerator
 
 
@@ -28,8 +27,11 @@ def scene() -> wf.Scene:
     return wf.Scene(shapes, [wf.Environment()], camera)
 
 
+KEEP = "wavefront.accel.cache.make_accelerator"
+
+
 @pytest.fixture
-def built(monkeypatch: pytest.MonkeyPatch) -> list[str]:
+def built(calls_of) -> list[str]:
     """The accelerators that were built so far."""
     names: list[str] = []
 
@@ -37,7 +39,7 @@ def built(monkeypatch: pytest.MonkeyPatch) -> list[str]:
         names.append(accel)
         return make_accelerator(geometry, accel)
 
-    monkeypatch.setattr(keep, "make_accelerator", noted)
+    calls_of(KEEP, noted)
     return names
 
 
@@ -124,7 +126,7 @@ def test_instances_are_kept_too(built: list[str]) -> None:
     assert len(built) == count
 
 
-def test_old_ones_are_gone_before_new_ones_are_built(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_old_ones_are_gone_before_new_ones_are_built(calls_of) -> None:
     subject = scene()
     look(subject)
     _, ((_, accelerator),) = subject.accelerators._kept["numpy"]
@@ -137,7 +139,7 @@ def test_old_ones_are_gone_before_new_ones_are_built(monkeypatch: pytest.MonkeyP
         alive.append(old() is not None)
         return make_accelerator(geometry, accel)
 
-    monkeypatch.setattr(keep, "make_accelerator", noted)
+    calls_of(KEEP, noted)
     lift_vertex(subject)
     look(subject)
     assert alive == [False]

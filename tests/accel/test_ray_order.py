@@ -1,5 +1,7 @@
 """Paths of large scenes are ordered by place: rays that start near each other are traced together."""
 
+from typing import Any
+
 import numpy as np
 import pytest
 from scenes import everything
@@ -23,12 +25,10 @@ def test_codes_interleave_the_bits_of_cells() -> None:
 
 
 @pytest.mark.parametrize("accel", ["numpy", "auto"])
-def test_the_order_changes_no_bit(monkeypatch: pytest.MonkeyPatch, accel: str) -> None:
+def test_the_order_changes_no_bit(monkeypatch: pytest.MonkeyPatch, calls_of: Any, accel: str) -> None:
     plain = wf.render(everything(), 4, accel=accel, progress=False)
     monkeypatch.setattr(compilation, "LARGE", 0)
-    orders = []
-    codes = MortonGrid.codes
-    monkeypatch.setattr(MortonGrid, "codes", lambda *args: orders.append(codes(*args)) or orders[-1])
+    orders = calls_of("wavefront.compile.morton.MortonGrid.codes")
     ordered = wf.render(everything(), 4, accel=accel, executor="threads", progress=False)
     assert np.array_equal(plain.rgb, ordered.rgb)
     assert len(orders) > 1

@@ -18,7 +18,6 @@ from wavefront.arrays.frame import Frame
 from wavefront.arrays.state import Hits, Paths, SurfaceInteraction
 from wavefront.arrays.vec import broadcast, f4, normalize
 from wavefront.compile.scene import ROULETTE_AFTER, CompiledScene, compile_scene
-from wavefront.integrators import ladder
 from wavefront.sampling.sampler import make_sampler
 from wavefront.stages import compact as stage
 from wavefront.stages.shade import shading
@@ -228,7 +227,7 @@ def test_roulette_looks_through_refraction() -> None:
     assert len(left) / (1 << 14) == pytest.approx(0.5, abs=0.02)
 
 
-def test_paths_remember_by_how_much_glass_compresses(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_paths_remember_by_how_much_glass_compresses(calls_of: Any) -> None:
     """η² inside a ball of index 1.5, 1 where they were reflected and after they have left it."""
     seen = []
 
@@ -236,7 +235,7 @@ def test_paths_remember_by_how_much_glass_compresses(monkeypatch: pytest.MonkeyP
         seen.append(np.unique(paths.roulette_scale.round(4)).tolist())
         return np.arange(len(paths))
 
-    monkeypatch.setattr(ladder, "roulette", note)
+    calls_of("wavefront.integrators.ladder.roulette", note)
     render(scenes.glass_ball(), 16, max_bounces=2)
     assert seen == [[1, 2.25], [1, 2.25]]
 

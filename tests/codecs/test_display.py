@@ -173,13 +173,10 @@ def test_white_balance_in_linear_files(tmp_path, image):
         assert (wf.Image(found).to_uint8() == image.to_uint8(exposure=1, white_balance=white)).all()
 
 
-def test_show_uses_the_viewer_of_the_system(image, monkeypatch):
-    from PIL import Image as PillowImage
-
-    shown = []
-    monkeypatch.setattr(PillowImage.Image, "show", lambda self: shown.append(np.asarray(self)))
+def test_show_uses_the_viewer_of_the_system(image, calls_of):
+    shown = calls_of("PIL.Image.Image.show", np.asarray)
     image.show(tone="agx", exposure=1)
-    assert (shown[0] == image.to_uint8(tone="agx", exposure=1)).all()
+    assert (shown[0].result == image.to_uint8(tone="agx", exposure=1)).all()
 
 
 def test_show_in_a_notebook(image, monkeypatch):

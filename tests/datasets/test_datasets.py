@@ -3,7 +3,9 @@
 import json
 import time
 from collections.abc import Callable
+from itertools import count
 from pathlib import Path
+from typing import Any
 
 import imageio.v3 as iio
 import numpy as np
@@ -336,7 +338,7 @@ def contents(folder: Path) -> dict[str, bytes]:
     }
 
 
-def test_a_call_that_was_stopped_goes_on(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_call_that_was_stopped_goes_on(tmp_path: Path, fails: Callable[..., Any]) -> None:
     """The views that are missing are rendered, and all files are those of one call."""
 
     def write(name: str) -> int:
@@ -345,16 +347,8 @@ def test_a_call_that_was_stopped_goes_on(tmp_path: Path, monkeypatch: pytest.Mon
         )
 
     assert write("whole") == 3
-    run = wf.Session.run
-    calls: list[int] = []
-
-    def stopped(session: wf.Session) -> wf.Image:
-        calls.append(1)
-        if len(calls) == 2:
-            raise wf.Interrupted("stopped")
-        return run(session)
-
-    monkeypatch.setattr(wf.Session, "run", stopped)
+    calls = count(1)
+    fails("wavefront.Session.run", wf.Interrupted("stopped"), lambda session: next(calls) == 2)
     with pytest.raises(wf.Interrupted):
         write("parts")
     assert not (tmp_path / "parts" / "annotations.json").exists()

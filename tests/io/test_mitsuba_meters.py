@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from pathlib import Path
-from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -13,7 +12,6 @@ import wavefront as wf
 from wavefront.camera import Sensors
 from wavefront.cli import main
 from wavefront.colors.spectrum import Y_INTEGRAL
-from wavefront.lights import sky
 from wavefront.lights.sky_functions import cie_function
 
 BLACK = {"type": "diffuse", "reflectance": 0.0}
@@ -137,7 +135,7 @@ def test_the_command_line_measures_what_a_file_has(
 
 
 @pytest.fixture
-def model(monkeypatch: pytest.MonkeyPatch) -> list[Any]:
+def model(calls_of: Any) -> list[Any]:
     """An even sky of radiance 4 and a sun of irradiance 1000; returns what is asked."""
     asked: list[Any] = []
 
@@ -145,7 +143,7 @@ def model(monkeypatch: pytest.MonkeyPatch) -> list[Any]:
         asked.append((turbidity, albedo.ravel().astype(float).round(4).tolist(), round(cos_sun, 4)))
         return cie_function(5), np.full((3, 1), 4, np.float32), np.full(3, 1000.0)
 
-    monkeypatch.setattr(sky, "hosek_wilkie_sky", even)
+    calls_of("wavefront.lights.sky.hosek_wilkie_sky", even)
     return asked
 
 
@@ -182,7 +180,7 @@ def test_the_parameters_of_sky_and_sun(model: list[Any]) -> None:
         lights(sun_direction=[0, 0, 1], complex_sun=True)
 
 
-def test_the_sun_at_a_time(model: list[Any], monkeypatch: pytest.MonkeyPatch) -> None:
+def test_the_sun_at_a_time(model: list[Any], calls_of: Any) -> None:
     """North is -x and east is -y before to_world; a time is that of its zone."""
     asked: list[Any] = []
 
@@ -190,7 +188,7 @@ def test_the_sun_at_a_time(model: list[Any], monkeypatch: pytest.MonkeyPatch) ->
         asked.append((time.isoformat(), latitude, longitude, up))
         return np.array([0.48, -0.6, 0.64])  # east, north, up
 
-    monkeypatch.setattr("wavefront.io.mitsuba.emitters.sun_position", position)
+    calls_of("wavefront.io.mitsuba.emitters.sun_position", position)
     above, _ = lights(
         year=2024, month=4, day=3, hour=9.5, minute=20.0, second=30.0, timezone=2.0, latitude=48.0
     )
@@ -217,8 +215,11 @@ def test_a_malformed_sky_is_refused(model: list[Any], parameters: dict[str, Any]
         lights(**parameters)
 
 
-def test_without_the_data_an_error_says_what_to_install(monkeypatch: pytest.MonkeyPatch) -> None:
-    finder = SimpleNamespace(find_spec=lambda name: None)
-    monkeypatch.setattr("wavefront.lights.hosek_wilkie.PathFinder", finder)
+def test_without_the_data_an_error_says_what_to_install(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (tmp_path / "mitsuba").mkdir()  # a package without them
+    (tmp_path / "mitsuba" / "__init__.py").touch()
+    monkeypatch.syspath_prepend(tmp_path)
     with pytest.raises(wf.SceneError, match=r"sun \(sunsky\): Sky.hosek_wilkie needs .*pip install mitsuba"):
         lights(sun_direction=[0, 0, 1])

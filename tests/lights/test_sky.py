@@ -208,8 +208,11 @@ def data(tmp_path: Path, monkeypatch) -> dict[str, np.ndarray]:
         "sky_rad_rgb": rng.uniform(1, 2, (10, 2, 6, 3)),
         "sun_rad_rgb": rng.uniform(1, 2, (10, 45, 3, 4, 6)),
     }
-    write_tensors(tmp_path / "data.bin", arrays)
-    monkeypatch.setattr(hosek_wilkie, "_path", lambda: tmp_path / "data.bin")
+    file = tmp_path / "mitsuba" / hosek_wilkie.FILE  # as if the package stood there
+    file.parent.mkdir(parents=True)
+    (tmp_path / "mitsuba" / "__init__.py").touch()
+    monkeypatch.syspath_prepend(tmp_path)
+    write_tensors(file, arrays)
     return arrays
 
 
@@ -255,17 +258,16 @@ def test_hosek_wilkie_at_the_ends_of_its_tables(data, turbidity: float) -> None:
             assert (sky.direct_normal > 0).all()
 
 
-def test_files_that_hold_no_sky(data, tmp_path: Path, monkeypatch) -> None:
+def test_files_that_hold_no_sky(data, tmp_path: Path) -> None:
     for raw in (b"", b"tensor_file\0\1\0\5\0\0\0", b"something else, and long enough to be read"):
-        (tmp_path / "bad.bin").write_bytes(raw)
-        monkeypatch.setattr(hosek_wilkie, "_path", lambda: tmp_path / "bad.bin")
+        (tmp_path / "mitsuba" / hosek_wilkie.FILE).write_bytes(raw)
         hosek_wilkie.tensors.cache_clear()
-        with pytest.raises(wf.SceneError, match=r"bad\.bin does not hold the data of the sky"):
+        with pytest.raises(wf.SceneError, match=r"sunsky_datasets\.bin does not hold the data of the sky"):
             wf.Sky.hosek_wilkie(3, 0, (0, 1, 0))
 
 
-def test_without_mitsuba(monkeypatch) -> None:
-    monkeypatch.setattr(hosek_wilkie.PathFinder, "find_spec", lambda name: None)
+def test_without_the_data_of_mitsuba(data, tmp_path: Path) -> None:
+    (tmp_path / "mitsuba" / hosek_wilkie.FILE).unlink()
     with pytest.raises(wf.SceneError, match="pip install mitsuba"):
         wf.Sky.hosek_wilkie(3, 0, (0, 1, 0))
 

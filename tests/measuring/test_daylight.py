@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 
 import wavefront as wf
-from wavefront.measuring import weather as weather_module
 from wavefront.measuring.weather import product
 
 QUIET = {"progress": False, "workers": 1}
@@ -197,7 +196,7 @@ def row(hour: int, direct: float, diffuse: float, day: str = "1999,6,21") -> str
 
 
 @pytest.fixture
-def asked(monkeypatch) -> list:
+def asked(calls_of) -> list:
     """In place of pvlib; returns what it is asked."""
     calls = []
 
@@ -205,7 +204,7 @@ def asked(monkeypatch) -> list:
         calls.append((time, place, axes))
         return np.tile((0.0, 1.0, 0.0), (len(time), 1))
 
-    monkeypatch.setattr(weather_module, "sun_position", sun_position)
+    calls_of("wavefront.measuring.weather.sun_position", sun_position)
     return calls
 
 

@@ -16,7 +16,6 @@ import wavefront as wf
 from wavefront.core.shared import STOP, SharedInt, Stopped
 from wavefront.scheduling import payload as payloads
 from wavefront.scheduling.pool import WorkerPool
-from wavefront.scheduling.remote import RemoteWorkers
 
 distributed = pytest.importorskip("distributed")
 QUIET = {"progress": False, "wave_size": 500}
@@ -61,12 +60,11 @@ def test_light_paths_come_from_a_cluster(client: Any, expected: bytes) -> None:
     assert images[0].standard_error.tobytes() == images[1].standard_error.tobytes()
 
 
-def test_a_task_has_several_waves(client: Any, expected: bytes, monkeypatch: pytest.MonkeyPatch) -> None:
-    jobs: list[Any] = []
-    submit = RemoteWorkers.submit
-    monkeypatch.setattr(RemoteWorkers, "submit", lambda *given: jobs.append(given[1]) or submit(*given))
+def test_a_task_has_several_waves(client: Any, expected: bytes, calls_of: Any) -> None:
+    calls = calls_of("wavefront.scheduling.remote.RemoteWorkers.submit")
     image = wf.render(scenes.everything(), 8, executor=client, progress=False, wave_size=10)
     assert image.rgb.tobytes() == expected
+    jobs = [call.args[1] for call in calls]
     assert sum(job.lanes for job in jobs) == image.metadata["samples"]
     assert max(len(list(job.waves())) for job in jobs) == 4
     assert all(wave.lanes <= 10 for job in jobs for wave in job.waves())

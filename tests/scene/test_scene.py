@@ -1,5 +1,7 @@
 """Scenes: what may be put together, what is refused and how, and what is compiled."""
 
+from typing import Any, Self
+
 import numpy as np
 import pytest
 import scenes
@@ -238,30 +240,37 @@ def test_materials_out_of_sight_are_not_shaded() -> None:
 
 
 class Ink(wf.Diffuse):
-    """Black, and in a group of its own."""
+    """Black, in a group of its own, and aware of what is shaded."""
 
     black = True
 
     def __init__(self) -> None:
         super().__init__(0)
         self.number = 1
+        self.shaded: list[int] = []
+
+    def bind(self, surface: Any) -> Self:
+        self.shaded.append(len(surface))
+        return self
 
 
-def test_paths_end_on_black_lights(monkeypatch: pytest.MonkeyPatch) -> None:
+class ShadedInk(Ink):
+    """Black, too, but does not say so."""
+
+    black = False
+
+
+def test_paths_end_on_black_lights() -> None:
     """They shine, but are not shaded; the picture is the same bit for bit if they are."""
     room = [
         wf.Sphere((0, 0, 0), 10, material=wf.Diffuse(0.5)),
         wf.Sphere((0, 0, -2), 1, material=wf.Diffuse(0.5), emission=1.0),
-        wf.Sphere((0, 3, -2), 1, material=Ink(), emission=5.0),
     ]
     camera = wf.Camera.look_at((0, 0, 5), (0, 0, 0), size=(8, 8))
-    scene, shaded = wf.Scene(room, camera=camera), []
-    monkeypatch.setattr(Ink, "bind", lambda self, surface: shaded.append(len(surface)) or self)
     pictures = []
-    for black in (True, False):
-        if not black:
-            monkeypatch.setattr(Ink, "black", False)
+    for ink in (Ink(), ShadedInk()):
+        scene = wf.Scene([*room, wf.Sphere((0, 3, -2), 1, material=ink, emission=5.0)], camera=camera)
         pictures.append(render(scene, 4, max_bounces=4).rgb)
-        assert bool(shaded) is not black
+        assert bool(ink.shaded) is not ink.black
     assert pictures[0].tobytes() == pictures[1].tobytes()
     assert pictures[0].max() > 1

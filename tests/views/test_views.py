@@ -1,6 +1,7 @@
 """Many views: cameras that move, renders of several cameras, animations."""
 
 from pathlib import Path
+from typing import Any
 
 import imageio.v3 as iio
 import numpy as np
@@ -114,14 +115,8 @@ def test_each_view_is_what_render_gives() -> None:
         assert np.array_equal(image.rgb, wf.render(SCENE, 4, camera=camera, seed=3, progress=False).rgb)
 
 
-def test_the_scene_is_compiled_once(monkeypatch: pytest.MonkeyPatch) -> None:
-    from wavefront.session import prepared_scene
-
-    calls = []
-    compile_scene = prepared_scene.compile_scene
-    monkeypatch.setattr(
-        prepared_scene, "compile_scene", lambda *a, **k: calls.append(1) or compile_scene(*a, **k)
-    )
+def test_the_scene_is_compiled_once(calls_of: Any) -> None:
+    calls = calls_of("wavefront.session.prepared_scene.compile_scene")
     assert len(list(wf.render_many(SCENE, wf.turntable(SCENE, 5, size=(8, 8)), 1, progress=False))) == 5
     assert len(calls) == 1
 
