@@ -587,3 +587,15 @@ def everything(size: tuple[int, int] = (9, 7)) -> wf.Scene:
         wf.Environment((0.2, 0.3, 0.5)),
     ]
     return wf.Scene([*scene.shapes, bumpy, glow], lights, scene.camera)
+
+
+def four_materials() -> list[wf.Shape]:
+    """Balls of a matte, a coated, a metallic and a transmitting material on a matte floor."""
+    materials = (
+        wf.Diffuse(0.7),
+        wf.Material.named("plastic"),
+        wf.Conductor.named("gold", 0.4),
+        wf.Dielectric(1.5, roughness=0.4),
+    )
+    balls = [wf.Sphere((1.2 * k - 1.8, 0, 0), 0.5, material=each) for k, each in enumerate(materials)]
+    return [*balls, wf.Rectangle((-4, -0.5, 4), (8, 0, 0), (0, 0, -8), material=wf.Diffuse(0.5))]

@@ -34,17 +34,17 @@ def left():
 ENDLESS = "wf.render(closed, 64, workers=2, executor={executor!r}, max_bounces=65536, progress={progress})"
 
 
+def start_python(*arguments: str) -> subprocess.Popen[str]:
+    """Start Python in a process group of its own, connected to this one."""
+    pipe = subprocess.PIPE
+    command = [sys.executable, "-W", "ignore", *arguments]
+    return subprocess.Popen(command, stdin=pipe, stdout=pipe, stderr=pipe, text=True, process_group=0)
+
+
 @contextmanager
 def script(body: str) -> Iterator[subprocess.Popen[str]]:
     """Run a script in a process group of its own."""
-    process = subprocess.Popen(
-        [sys.executable, "-W", "ignore", "-c", CLOSED + body],
-        stdin=subprocess.PIPE,
-        stdout=subprocess.PIPE,
-        stderr=subprocess.PIPE,
-        text=True,
-        process_group=0,
-    )
+    process = start_python("-c", CLOSED + body)
     try:
         yield process
     finally:

@@ -7,23 +7,7 @@ from hypothesis import strategies as st
 from significance import render
 
 import wavefront as wf
-from wavefront.bsdfs import (
-    ALL,
-    Conductor,
-    Dielectric,
-    Diffuse,
-    DiffuseTransmission,
-    Disney,
-    Mirror,
-    Mix,
-    OpenPBRBsdf,
-    OrenNayar,
-    Plastic,
-    Principled,
-    Sides,
-    ThinDielectric,
-    ThinDisney,
-)
+from wavefront.bsdfs import ALL, OpenPBRBsdf
 from wavefront.bsdfs.microfacet import Facets
 from wavefront.testing.bsdf import check_bsdf
 
@@ -78,7 +62,7 @@ GGX = {
 
 @pytest.mark.parametrize(("alpha", "mu"), GGX)
 def test_ggx_directional_albedo(alpha, mu):
-    perfect = Conductor(1e-6, 1e4, np.sqrt(alpha), multiscatter=False)  # reflects all at every angle
+    perfect = wf.Conductor(1e-6, 1e4, np.sqrt(alpha), multiscatter=False)  # reflects all at every angle
     assert albedo(perfect, mu) == pytest.approx(GGX[alpha, mu], abs=5e-5)
 
 
@@ -111,7 +95,7 @@ def test_mirror_lobe_is_reciprocal_and_finite(alpha, mu, nu, phi):
 
 @given(ior=st.floats(0.4, 3), roughness=st.floats(0, 1), mu=st.floats(1e-5, 1), back_facing=st.booleans())
 def test_dielectric_samples_keep_their_promises(ior, roughness, mu, back_facing):
-    glass = Dielectric(ior, roughness, multiscatter=False)
+    glass = wf.Dielectric(ior, roughness, multiscatter=False)
     glass.eta = 1 / glass.ior if back_facing else glass.ior
     rng = np.random.default_rng(0)
     wo = toward(mu, 200)
@@ -133,10 +117,12 @@ def test_dielectric_samples_keep_their_promises(ior, roughness, mu, back_facing)
     ],
 )
 def test_rough_glass_loses_what_its_documentation_says(roughness, outside, back_facing):
-    assert 1 - albedo(Dielectric(1.5, roughness, multiscatter=False), 1.0) == pytest.approx(outside, abs=3e-4)
-    assert 1 - albedo(Dielectric(1.5, roughness, multiscatter=False), 1.0, back_facing=True) == pytest.approx(
-        back_facing, abs=1e-3
+    assert 1 - albedo(wf.Dielectric(1.5, roughness, multiscatter=False), 1.0) == pytest.approx(
+        outside, abs=3e-4
     )
+    assert 1 - albedo(
+        wf.Dielectric(1.5, roughness, multiscatter=False), 1.0, back_facing=True
+    ) == pytest.approx(back_facing, abs=1e-3)
 
 
 @pytest.mark.parametrize(
@@ -144,7 +130,7 @@ def test_rough_glass_loses_what_its_documentation_says(roughness, outside, back_
     [(0.1, 0.0006), (0.1**0.5, 0.0400), (0.5, 0.1831), (0.5**0.5, 0.4104), (1.0, 0.6522)],
 )
 def test_a_ball_of_rough_glass_loses_what_its_documentation_says(roughness, loss):
-    ball = wf.Sphere((0, 0, 0), 1, material=Dielectric(1.5, roughness, multiscatter=False))
+    ball = wf.Sphere((0, 0, 0), 1, material=wf.Dielectric(1.5, roughness, multiscatter=False))
     camera = wf.Camera.orthographic((0, 0, 5), (0, 0, 0), height=1.8, size=(24, 24))
     scene = wf.Scene(ball, [wf.Environment(1.0)], camera)
     y, x = np.mgrid[:24, :24] - 11.5
@@ -154,7 +140,7 @@ def test_a_ball_of_rough_glass_loses_what_its_documentation_says(roughness, loss
 
 
 def test_rough_glass_becomes_smooth_glass():
-    rough, smooth = Dielectric(1.5, 0.032), Dielectric(1.5)
+    rough, smooth = wf.Dielectric(1.5, 0.032), wf.Dielectric(1.5)
     u = stratified(3, 64)
     for mu in (1, 0.5, 0.1):
         wo = toward(mu, u.shape[1])
@@ -169,7 +155,7 @@ def test_rough_glass_becomes_smooth_glass():
 def test_oren_nayar_albedo(angle, value):
     wi = upper_hemisphere(700)
     wo = np.repeat(toward(np.cos(np.radians(angle))), wi.shape[1], 1)
-    f = OrenNayar(1.0, 0.5).f(wo, wi)[0].astype(float)
+    f = wf.OrenNayar(1.0, 0.5).f(wo, wi)[0].astype(float)
     assert (f * wi[2]).mean() * 2 * np.pi == pytest.approx(value, abs=2e-5)
 
 
@@ -178,7 +164,7 @@ def test_oren_nayar_albedo(angle, value):
 def test_eon_preserves_energy_at_every_angle(sigma, mu):
     wi = upper_hemisphere(700)
     wo = np.repeat(toward(mu), wi.shape[1], 1)
-    f = OrenNayar(1.0, sigma, energy_preserving=True).f(wo, wi)[0].astype(float)
+    f = wf.OrenNayar(1.0, sigma, energy_preserving=True).f(wo, wi)[0].astype(float)
     assert (f * wi[2]).mean() * 2 * np.pi == pytest.approx(1, abs=1e-4)
 
 
@@ -186,8 +172,8 @@ def test_sigma_0_is_diffuse():
     wi = upper_hemisphere(50)
     wo = np.repeat(toward(0.3), wi.shape[1], 1)
     for preserving in (False, True):
-        lambertian = OrenNayar(0.7, 0.0, energy_preserving=preserving)
-        assert lambertian.f(wo, wi) == pytest.approx(Diffuse(0.7).f(wo, wi), rel=1e-5)
+        lambertian = wf.OrenNayar(0.7, 0.0, energy_preserving=preserving)
+        assert lambertian.f(wo, wi) == pytest.approx(wf.Diffuse(0.7).f(wo, wi), rel=1e-5)
 
 
 def appendix_b(base_color, metallic, roughness, wo, wi):
@@ -215,10 +201,10 @@ def test_principled_holds_the_gltf_material(metallic, roughness):
     wo[2], wi[2] = np.abs(wo[2]), np.abs(wi[2])
     wo, wi = (w / np.linalg.norm(w, axis=0) for w in (wo, wi))
     exact = appendix_b((0.9, 0.5, 0.1), metallic, roughness, wo, wi)
-    literal = Principled((0.9, 0.5, 0.1), metallic, roughness, conserve_energy=False).f(wo, wi)
+    literal = wf.Principled((0.9, 0.5, 0.1), metallic, roughness, conserve_energy=False).f(wo, wi)
     assert literal == pytest.approx(exact, rel=1e-4)
     if metallic == 1:
-        assert Principled((0.9, 0.5, 0.1), 1, roughness, multiscatter=False).f(wo, wi) == pytest.approx(
+        assert wf.Principled((0.9, 0.5, 0.1), 1, roughness, multiscatter=False).f(wo, wi) == pytest.approx(
             exact, rel=1e-4
         )
 
@@ -226,7 +212,7 @@ def test_principled_holds_the_gltf_material(metallic, roughness):
 @pytest.mark.parametrize("mu", [1.0, 0.5, 0.1, 0.02])
 @pytest.mark.parametrize("roughness", [0.1, 0.5, 1.0])
 def test_white_plastic_reflects_all_light(roughness, mu):
-    assert albedo(Principled(1.0, 0, roughness), mu) == pytest.approx(1, abs=4e-3)
+    assert albedo(wf.Principled(1.0, 0, roughness), mu) == pytest.approx(1, abs=4e-3)
 
 
 def test_parts_of_principled_agree_with_the_materials_of_their_own():
@@ -235,12 +221,15 @@ def test_parts_of_principled_agree_with_the_materials_of_their_own():
     wo[2] = np.abs(wo[2])
     wo, wi = (w / np.linalg.norm(w, axis=0) for w in (wo, wi))
     for whole, part in (
-        (Principled((1, 0.5, 0.2), 0, 0.5, 1.4, 1.0), Dielectric(1.4, 0.5, transmittance=(1, 0.5, 0.2))),
         (
-            Principled((1, 0.5, 0.2), 0, 0.5, 1.4, 1.0, thin=True),
-            ThinDielectric(1.4, 0.5, transmittance=(1, 0.5, 0.2)),
+            wf.Principled((1, 0.5, 0.2), 0, 0.5, 1.4, 1.0),
+            wf.Dielectric(1.4, 0.5, transmittance=(1, 0.5, 0.2)),
         ),
-        (Principled(0.3, 0, 0.5, specular=0.0), Diffuse(0.3)),
+        (
+            wf.Principled((1, 0.5, 0.2), 0, 0.5, 1.4, 1.0, thin=True),
+            wf.ThinDielectric(1.4, 0.5, transmittance=(1, 0.5, 0.2)),
+        ),
+        (wf.Principled(0.3, 0, 0.5, specular=0.0), wf.Diffuse(0.3)),
     ):
         for ours, theirs in zip(whole.evaluate(wo, wi), part.evaluate(wo, wi), strict=True):
             assert ours == pytest.approx(theirs, rel=1e-5, abs=1e-7)
@@ -253,7 +242,7 @@ def test_the_narrowest_densities_of_glass_are_whole(ior, alpha, back_facing):
     edges = np.concatenate([[0], np.geomspace(1e-9, np.pi / 2 - 1e-6, 400_001)])
     theta = (edges[1:] + edges[:-1]) / 2
     solid_angle = 4 * np.pi * np.sin(theta) * np.sin(np.diff(edges) / 2)
-    glass, wo = Dielectric(ior, np.sqrt(alpha)), toward(1.0, len(theta))
+    glass, wo = wf.Dielectric(ior, np.sqrt(alpha)), toward(1.0, len(theta))
     glass.eta = 1 / glass.ior if back_facing else glass.ior
     total = 0.0
     for side in (1, -1):
@@ -286,19 +275,19 @@ def facets(rng, roughness):
 ROUGHNESS = [0.0, 1e-3, 0.05, None, 1.0]
 # One material of each kind with random parameters, of a given roughness where it has one.
 RANDOM = {
-    Diffuse: lambda rng, roughness: Diffuse(color(rng)),
-    Mirror: lambda rng, roughness: Mirror(color(rng)),
-    Conductor: lambda rng, roughness: Conductor(
+    wf.Diffuse: lambda rng, roughness: wf.Diffuse(color(rng)),
+    wf.Mirror: lambda rng, roughness: wf.Mirror(color(rng)),
+    wf.Conductor: lambda rng, roughness: wf.Conductor(
         rng.uniform(0.1, 3, 3),
         rng.uniform(0, 6, 3),
         roughness,
         reflectance=color(rng),
         **facets(rng, roughness),
     ),
-    Dielectric: lambda rng, roughness: Dielectric(
+    wf.Dielectric: lambda rng, roughness: wf.Dielectric(
         index(rng), roughness, reflectance=color(rng), transmittance=color(rng), **facets(rng, roughness)
     ),
-    Plastic: lambda rng, roughness: Plastic(
+    wf.Plastic: lambda rng, roughness: wf.Plastic(
         color(rng),
         roughness,
         rng.uniform(1.1, 2.5),
@@ -307,11 +296,13 @@ RANDOM = {
         distribution=rng.choice(["ggx", "beckmann"]),
         multiscatter=rng.random() < 0.5,
     ),
-    ThinDielectric: lambda rng, roughness: ThinDielectric(
+    wf.ThinDielectric: lambda rng, roughness: wf.ThinDielectric(
         index(rng), roughness, reflectance=color(rng), transmittance=color(rng)
     ),
-    OrenNayar: lambda rng, roughness: OrenNayar(color(rng), roughness, energy_preserving=rng.random() < 0.5),
-    Principled: lambda rng, roughness: Principled(
+    wf.OrenNayar: lambda rng, roughness: wf.OrenNayar(
+        color(rng), roughness, energy_preserving=rng.random() < 0.5
+    ),
+    wf.Principled: lambda rng, roughness: wf.Principled(
         color(rng),
         rng.choice([0, 1, rng.random()]),
         roughness,
@@ -326,15 +317,15 @@ RANDOM = {
         specular=rng.random(),
         specular_color=4 * color(rng),
     ),
-    Mix: lambda rng, roughness: Mix(
-        RANDOM[rng.choice([Diffuse, Mirror, Conductor])](rng, roughness),
-        RANDOM[rng.choice([Dielectric, ThinDielectric, OrenNayar, Principled])](rng, roughness),
+    wf.Mix: lambda rng, roughness: wf.Mix(
+        RANDOM[rng.choice([wf.Diffuse, wf.Mirror, wf.Conductor])](rng, roughness),
+        RANDOM[rng.choice([wf.Dielectric, wf.ThinDielectric, wf.OrenNayar, wf.Principled])](rng, roughness),
         rng.random(),
     ),
 }
 
 
-RANDOM[Disney] = lambda rng, roughness: Disney(
+RANDOM[wf.Disney] = lambda rng, roughness: wf.Disney(
     0.3 * color(rng),  # it may reflect more light than arrives
     roughness,
     rng.choice([0, rng.random()]),
@@ -367,7 +358,7 @@ RANDOM[OpenPBRBsdf] = lambda rng, roughness: OpenPBRBsdf(
     fuzz_roughness=rng.choice([roughness, rng.random()]),
     thin_film_weight=rng.choice([0, 0, rng.random()]),
 )
-RANDOM[ThinDisney] = lambda rng, roughness: ThinDisney(
+RANDOM[wf.ThinDisney] = lambda rng, roughness: wf.ThinDisney(
     0.5 * color(rng),  # it may reflect more light than arrives
     roughness,
     anisotropic=rng.choice([0, rng.random()]) if roughness > 0.1 else 0,
@@ -377,16 +368,18 @@ RANDOM[ThinDisney] = lambda rng, roughness: ThinDisney(
     specular_tint=0.3 * rng.random(),
     flatness=rng.random(),
 )
-RANDOM[DiffuseTransmission] = lambda rng, roughness: DiffuseTransmission(0.5 * color(rng), 0.5 * color(rng))
-RANDOM[Sides] = lambda rng, roughness: Sides(
-    RANDOM[rng.choice([Diffuse, Mirror, Conductor])](rng, roughness),
-    rng.choice([None, RANDOM[rng.choice([OrenNayar, Plastic])](rng, roughness)]),
+RANDOM[wf.DiffuseTransmission] = lambda rng, roughness: wf.DiffuseTransmission(
+    0.5 * color(rng), 0.5 * color(rng)
+)
+RANDOM[wf.Sides] = lambda rng, roughness: wf.Sides(
+    RANDOM[rng.choice([wf.Diffuse, wf.Mirror, wf.Conductor])](rng, roughness),
+    rng.choice([None, RANDOM[rng.choice([wf.OrenNayar, wf.Plastic])](rng, roughness)]),
 )
 # with the roughnesses of each; None is a random one, and the others have none
 KINDS = [
     (kind, r)
     for kind in ALL
-    for r in ([None] if kind in (Diffuse, DiffuseTransmission, Mirror) else ROUGHNESS)
+    for r in ([None] if kind in (wf.Diffuse, wf.DiffuseTransmission, wf.Mirror) else ROUGHNESS)
 ]
 
 
@@ -400,9 +393,9 @@ def check_random(kind, roughness, seed, samples):
     # Light that crosses at 89.5° leaves so near the critical angle that float32 keeps few digits of
     # its cosine: 1 in 100 pairs of directions would differ by 0.4 % in reciprocity, where 0.3 % may.
     grazing = 89.0 if bsdf.transmissive else 89.5
-    angles, reciprocal = (0.0, float(rng.uniform(0, 89)), grazing), kind is not ThinDisney
+    angles, reciprocal = (0.0, float(rng.uniform(0, 89)), grazing), kind is not wf.ThinDisney
     # Disney's coat adds up to a quarter of the light to what the base reflects.
-    most = 1.25 if kind is Disney else 1.0
+    most = 1.25 if kind is wf.Disney else 1.0
     check_bsdf(bsdf, angles=angles, seed=seed, samples=samples, reciprocal=reciprocal, albedo=(0.0, most))
 
 

@@ -4,6 +4,7 @@ from functools import cache
 
 import numpy as np
 import pytest
+import scenes
 from significance import assert_same_images, repeat
 
 import wavefront as wf
@@ -165,16 +166,6 @@ def test_many_triangles_are_sampled_plainly() -> None:
 
 def room() -> wf.Scene:
     """Surfaces of several kinds, lit by a panel close to a wall, a textured one, a triangle and a sphere."""
-    balls = [
-        wf.Sphere((x, 0, 0), 0.5, material=material)
-        for x, material in (
-            (-1.8, wf.Diffuse(0.7)),
-            (-0.6, wf.Material.named("plastic")),
-            (0.6, wf.Conductor.named("gold", 0.4)),
-            (1.8, wf.Dielectric(1.5, roughness=0.4)),
-        )
-    ]
-    floor = wf.Rectangle((-4, -0.5, 4), (8, 0, 0), (0, 0, -8), material=wf.Diffuse(0.5))
     wall = wf.Rectangle((-4, -0.5, -1.5), (8, 0, 0), (0, 4, 0), material=wf.Diffuse(0.5))
     panel = wf.Rectangle((-2, 1.2, -1.4), (2, 0, 0), (0, 0, 1.2), emission=3)
     lone = wf.Mesh([(1, 2, 1), (2.5, 1.5, 0), (2, 2.5, -1)], [(0, 2, 1)], emission=4, two_sided=True)
@@ -183,7 +174,7 @@ def room() -> wf.Scene:
     textured = wf.Mesh(patch.vertices, patch.faces, colors=colors, emission=wf.VertexColors())
     camera = wf.Camera.look_at((0, 1.2, 6), (0, 0.4, 0), fov=30, size=(32, 16))
     lamp = wf.Sphere((2.6, 0.3, 0.6), 0.5, emission=2)
-    return wf.Scene([*balls, floor, wall, panel, lone, textured, lamp], camera=camera)
+    return wf.Scene([*scenes.four_materials(), wall, panel, lone, textured, lamp], camera=camera)
 
 
 @pytest.mark.parametrize(

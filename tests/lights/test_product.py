@@ -4,6 +4,7 @@ from functools import cache
 
 import numpy as np
 import pytest
+import scenes
 from significance import assert_same_images, repeat
 
 import wavefront as wf
@@ -109,18 +110,8 @@ def test_normals_are_found_in_their_bins() -> None:
 
 def surfaces() -> wf.Scene:
     """Matte, glossy, rough and transmitting surfaces, a panel, and two environments in one."""
-    balls = [
-        wf.Sphere((x, 0, 0), 0.5, material=material)
-        for x, material in (
-            (-1.8, wf.Diffuse(0.7)),
-            (-0.6, wf.Material.named("plastic")),
-            (0.6, wf.Conductor.named("gold", 0.4)),
-            (1.8, wf.Dielectric(1.5, roughness=0.4)),
-        )
-    ]
-    floor = wf.Rectangle((-4, -0.5, 4), (8, 0, 0), (0, 0, -8), material=wf.Diffuse(0.5))
     camera = wf.Camera.look_at((0, 1.2, 6), (0, 0, 0), fov=30, size=(32, 16))
-    return wf.Scene([*balls, floor], [wf.Environment(sky())], camera)
+    return wf.Scene(scenes.four_materials(), [wf.Environment(sky())], camera)
 
 
 @pytest.mark.parametrize(

@@ -5,11 +5,11 @@ from __future__ import annotations
 import json
 import os
 import signal
-import subprocess
 import sys
 import threading
 
 import pytest
+from scripts import start_python
 
 from wavefront.core.interrupt import InterruptHandler, deferred_signals
 from wavefront.core.shared import STOP, SharedInt
@@ -84,14 +84,7 @@ print(json.dumps(found))
 
 def tries(executor: str, accel: str, when: str, count: int, seed: int = 1) -> list[float]:
     """Press Ctrl-C in so many renders; return the seconds to the prompt. Nothing may be left of any."""
-    process = subprocess.Popen(
-        [sys.executable, "-W", "ignore", "-", executor, accel, when, str(count), str(seed)],
-        stdin=subprocess.PIPE,
-        stdout=subprocess.PIPE,
-        stderr=subprocess.PIPE,
-        text=True,
-        process_group=0,
-    )
+    process = start_python("-", executor, accel, when, str(count), str(seed))
     try:
         output, errors = process.communicate(TRIES, TIMEOUT)
     finally:
