@@ -251,7 +251,7 @@ def test_completion_prints_a_script(shell: str, run, tmp_path: Path) -> None:
 def test_completion_says_what_it_needs(missing, capsys) -> None:
     missing("shtab")
     assert cli.main(["completion", "bash"]) == 2
-    assert capsys.readouterr().err == "wavefront: error: completion needs pip install shtab\n"
+    assert "pip install shtab" in capsys.readouterr().err
 
 
 def test_doctor_says_what_is_there_and_tests_it(run) -> None:

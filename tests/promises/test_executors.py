@@ -5,7 +5,6 @@ from __future__ import annotations
 import multiprocessing
 import os
 import pickle
-import platform
 import signal
 import subprocess
 import sys
@@ -167,13 +166,13 @@ def test_workers_that_cannot_read_the_file_are_sent_the_scene(expected, monkeypa
     assert image.rgb.tobytes() == expected
 
 
-def test_the_deadline_is_that_of_the_clock_of_the_machine(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_the_deadline_is_that_of_the_clock_of_the_machine(calls_of: Any, set_clock: Any) -> None:
     view = jobs.CameraJob(None, time.perf_counter() + 100)  # type: ignore[arg-type]
     pickled = pickle.dumps(view)
     assert pickle.loads(pickled).deadline == view.deadline
-    monkeypatch.setattr(platform, "node", lambda: "another")
+    calls_of("platform.node", lambda: "another")
     clock = time.perf_counter
-    monkeypatch.setattr(time, "perf_counter", lambda: clock() - 1e6)
+    set_clock(lambda: clock() - 1e6)
     assert 90 < pickle.loads(pickled).deadline - time.perf_counter() <= 100
 
 

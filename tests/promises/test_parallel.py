@@ -195,10 +195,15 @@ def test_a_stop_ends_a_run(executor: str) -> None:
 # --- which executor -------------------------------------------------------------------------------
 
 
+@pytest.fixture
+def no_busy_threads(calls_of: Any) -> None:
+    """No other thread of this process computes, whatever the machine says."""
+    calls_of("wavefront.scheduling.executors._other_threads_compute", lambda: False)
+
+
 @processes
-def test_much_work_goes_to_processes(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Little, or that of one worker, to threads; here no other thread is busy."""
-    monkeypatch.setattr(executors, "_other_threads_compute", lambda: False)
+def test_much_work_goes_to_processes(no_busy_threads: None) -> None:
+    """Little, or that of one worker, to threads."""
     assert choose_executor(None, 2, MIN_PATHS) == "processes"
     assert choose_executor(None, 2, MIN_PATHS - 1) == "threads"
     assert choose_executor(None, 1, MIN_PATHS) == "threads"
@@ -260,15 +265,12 @@ def test_where_processes_are_not_forked_they_need_more_work(monkeypatch: pytest.
         ImportError("This platform lacks a functioning sem_open implementation"),
     ],
 )
-def test_without_semaphores_there_are_threads(error: Exception, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_without_semaphores_there_are_threads(
+    error: Exception, fails: Any, no_busy_threads: None, monkeypatch: pytest.MonkeyPatch
+) -> None:
     """With a line that says so, where processes would be faster, and an error where they are asked for."""
-
-    def fail(*given: object, **named: object) -> None:
-        raise error
-
-    monkeypatch.setattr("multiprocessing.synchronize.SemLock.__init__", fail)
+    fails("multiprocessing.synchronize.SemLock.__init__", error)
     monkeypatch.setattr(executors, "MIN_PATHS", 1)
-    monkeypatch.setattr(executors, "_other_threads_compute", lambda: False)
     picture: dict[str, Any] = {"spp": 1, "size": (16, 16), "workers": 2}
     with pytest.warns(UserWarning, match=r"workers are threads.*no semaphores.*/dev/shm"):
         image = wf.render(scenes.everything(), **picture)

@@ -471,9 +471,8 @@ def test_estimates_are_unbiased(name):
 
 @pytest.mark.parametrize("seed", [-1, 2**64, 1.5, "7", None, True])
 def test_bad_seeds_are_refused(seed):
-    with pytest.raises(SceneError) as caught:
+    with pytest.raises(SceneError, match=rf"seed is {seed!r}; .*2\*\*64"):
         make_sampler("sobol", seed)
-    assert str(caught.value) == f"seed is {seed!r}; it must be an integer in [0, 2**64)"
 
 
 @pytest.mark.parametrize("seed", [0, 2**64 - 1, np.int64(5), np.uint64(2**64 - 1)])
@@ -482,11 +481,8 @@ def test_good_seeds_are_taken(seed):
 
 
 def test_unknown_names_are_refused():
-    with pytest.raises(SceneError) as caught:
+    with pytest.raises(SceneError, match=r"sampler is 'halton'; .*sobol, bluenoise, independent"):
         make_sampler("halton")
-    assert str(caught.value) == (
-        "sampler is 'halton'; it must be one of sobol, bluenoise, independent; did you mean 'sobol'?"
-    )
 
 
 @names
