@@ -235,7 +235,7 @@ def test_paths_remember_by_how_much_glass_compresses(calls_of: Any) -> None:
         seen.append(np.unique(paths.roulette_scale.round(4)).tolist())
         return np.arange(len(paths))
 
-    calls_of("wavefront.integrators.ladder.roulette", note)
+    calls_of("wavefront.integrators.steps.roulette", note)
     render(scenes.glass_ball(), 16, max_bounces=2)
     assert seen == [[1, 2.25], [1, 2.25]]
 

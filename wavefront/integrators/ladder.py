@@ -14,11 +14,10 @@ from ..arrays.vec import Floats, f4
 from ..compile.scene import CompiledScene
 from ..guiding import GuideTable
 from ..sampling.sampler import Sampler
-from ..stages.bounce import bounce_sample, branch, copies
+from ..stages.bounce import bounce_sample
 from ..stages.compact import alive, roulette, select, specular_lanes
-from ..stages.guidance import guide
 from ..stages.shade import direct
-from .steps import accumulate, intersect_and_compact, prepare_shading
+from .steps import accumulate, intersect_and_compact, prepare_shading, scatter
 
 
 def li_naive(scene: CompiledScene, paths: Paths, sampler: Sampler, max_bounces: int) -> Floats:
@@ -83,12 +82,6 @@ def li_full(
         paths, hits = intersect_and_compact(scene, paths, sampler, bounce, L, mis=True)
         if bounce == max_bounces or not len(paths):
             break
-        shade = guide(prepare_shading(scene, paths, hits), table)
         ways = branches if bounce == 0 else 1
-        for each in copies(paths, ways):
-            found = direct(scene, each, shade, sampler, bounce, mis=True)
-            found.radiance *= f4(1 / ways)
-            accumulate(L, paths, found)
-        paths = branch(paths, shade, sampler, bounce, ways)
-        paths = select(paths, roulette(scene, paths, sampler, bounce, branches))
+        paths = scatter(scene, L, paths, hits, sampler, bounce, ways=ways, branches=branches, table=table)
     return L

@@ -21,7 +21,7 @@ from ..stages.guidance import guide
 from ..stages.reuse import SHARED_WAYS, add_shared, as_shared, can_reuse, shared_points
 from ..stages.shade import Shading, direct
 from .ladder import li_full
-from .steps import accumulate, intersect_and_compact, prepare_shading
+from .steps import accumulate, intersect_and_compact, prepare_shading, scatter
 
 JOINED_AFTER = 3  # bounces: a quarter of the paths is left then
 FEW = 1 << 14  # paths that go on together sooner
@@ -138,10 +138,8 @@ class Sharing:
 
     def _scatter(self, paths: Paths, hits: Hits, bounce: int, L: Floats) -> Paths:
         """Add direct light to L, and return the paths that go on in new directions."""
-        shade = guide(prepare_shading(self.scene, paths, hits), self.table)
-        accumulate(L, paths, direct(self.scene, paths, shade, self.sampler, bounce, mis=True))
-        paths = bounce_sample(paths, shade, self.sampler, bounce)
-        return select(paths, roulette(self.scene, paths, self.sampler, bounce, self.branches))
+        branches, table = self.branches, self.table
+        return scatter(self.scene, L, paths, hits, self.sampler, bounce, branches=branches, table=table)
 
     def _onward(self, paths: Paths, bounce: int, L: Floats) -> tuple[Paths, Hits]:
         """Return paths that have left the surfaces of a bounce, at their next ones."""

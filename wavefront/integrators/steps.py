@@ -9,18 +9,21 @@ import numpy as np
 
 from ..aovs.path_recorder import MetSurfaces
 from ..arrays.state import Contribution, Hits, Paths
-from ..arrays.vec import Floats, Ints, add_to_slots, highest, take
+from ..arrays.vec import Floats, Ints, add_to_slots, f4, highest, take
 from ..compile.scene import CompiledScene
+from ..guiding import GuideTable
 from ..sampling.sampler import Sampler
 from ..stages.alpha import alpha_pass_through
 from ..stages.background import show_background
-from ..stages.compact import compact, scattering_lanes
+from ..stages.bounce import branch, copies
+from ..stages.compact import compact, roulette, scattering_lanes, select
+from ..stages.guidance import guide
 from ..stages.interaction import interaction
 from ..stages.intersect import intersect
 from ..stages.medium import absorb
 from ..stages.normal_mapping import perturb_normals
 from ..stages.sensors import at_sensors, sensor_shading
-from ..stages.shade import Shading, emitted, mis_weighted, shading, without_caustics
+from ..stages.shade import Shading, direct, emitted, mis_weighted, shading, without_caustics
 from ..stages.shadow_catcher import off_catchers
 
 
@@ -77,6 +80,28 @@ def prepare_shading(scene: CompiledScene, paths: Paths, hits: Hits) -> Shading:
     if paths.recorder is not None:
         paths.recorder.record_surfaces(scene, paths, shade)
     return shade
+
+
+def scatter(
+    scene: CompiledScene,
+    L: Floats,
+    paths: Paths,
+    hits: Hits,
+    sampler: Sampler,
+    bounce: int,
+    *,
+    ways: int = 1,
+    branches: int = 1,
+    table: GuideTable | None = None,
+) -> Paths:
+    """Add direct light to L, and return the paths that go on in new directions, each in several ways."""
+    shade = guide(prepare_shading(scene, paths, hits), table)
+    for each in copies(paths, ways):
+        found = direct(scene, each, shade, sampler, bounce, mis=True)
+        found.radiance *= f4(1 / ways)
+        accumulate(L, each, found)
+    paths = branch(paths, shade, sampler, bounce, ways)
+    return select(paths, roulette(scene, paths, sampler, bounce, branches))
 
 
 def accumulate(L: Floats, paths: Paths, contribution: Contribution) -> None:
