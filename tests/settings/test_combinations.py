@@ -139,9 +139,10 @@ def test_auto_leaves_re_use_out(each: Exclusion, monkeypatch: pytest.MonkeyPatch
 
     render = Trial._render
 
-    def pays(trial: Trial, branches: int, reuse: bool, guided: bool) -> Run:
+    def pays(trial: Trial, reuse: bool, guided: bool) -> Run:
         variance = np.full(16, 0.1 if reuse else 1.0)
-        return replace(render(trial, branches, reuse, guided), variance=variance, rays=1)
+        run = render(trial, reuse, guided)
+        return replace(run, variance=variance, common=variance, first=0.0, onward=1.0)
 
     monkeypatch.setattr(choice, "LEAST_PIXELS", 1)
     monkeypatch.setattr(tiles, "PIXELS_PER_TRIED", 100)

@@ -25,7 +25,7 @@ from ..arrays.vec import Doubles, Ints
 SIDE = 4  # cells of a block, in each direction; each has a pixel of every tile
 STRIDE = 7  # pixels of a cell, in each direction
 MEMBERS = SIDE * SIDE
-PIXELS_PER_TRIED = 1024  # of a picture, for each tile of a tuning run: a quarter of a path for each pixel
+PIXELS_PER_TRIED = 1536  # of a picture, for each tile of a tuning run: a sixth of a sample of each pixel
 POINTS_PER_TRIED, LEAST_TRIED = 1024, 8  # likewise of sensors, which get many samples; and tiles for few
 TILES_PER_BLOCK = 4  # of sensors, which get samples together: as many as the squares of a picture have pixels
 MORTON_BITS = 20  # of each coordinate

@@ -14,7 +14,7 @@ from ..camera import Camera
 from ..compile.scene import CompiledScene
 from ..guiding import GuideTable
 from ..integrators.training import train
-from ..integrators.tuning import MOST_BRANCHES, JobsRunner, Run, Trial
+from ..integrators.tuning import BRANCHES, JobsRunner, Run, Trial
 from ..sampling.sampler import make_sampler
 from ..sampling.tiles import MEMBERS, SIDE, STRIDE
 from ..settings import AUTO, Settings
@@ -27,13 +27,10 @@ GUIDE_HINT = "most light is hard to find here: guide=True may pay (docs/guiding.
 # Variance times rays must fall below this part: rays tell the cost to about a tenth, and a trial may miss the
 # few paths that find most of the light.
 GAIN = 0.85
-GAIN_OF_BRANCHES = 0.9  # likewise; costs of branches are known to 0.04 where few fireflies make the noise
+GAIN_OF_BRANCHES = 0.95  # likewise; costs of branches are known better, since one run tells all of them
 OUTLIERS = 0.02  # part of the pixels, the noisiest, that do not count
 OUTLIERS_OF_SHARED = 0.005  # likewise, for re-use, which may bring most where few pixels hold the noise
-GAIN_BESIDE_GLOSS = (
-    0.5  # where not all is matte and light is not rare: sharp lobes gain little, and trials miss it
-)
-CLEAR_GAIN = 0.4  # below that part, re-use is better than any number of branches, which are not tried then
+GAIN_BESIDE_GLOSS = 0.6  # of re-use beside sharp lobes: they gain little, and trials miss it
 GUIDE_TILES = 128  # whatever the size of the picture: training takes longer anyway
 RARE_LIGHT = 1.0  # relative variance of a pixel of four samples, from where on light is hard to find
 COMMON_GLOSS = 0.03  # part of the second points, from where on a trial sees enough of what a material does
@@ -48,6 +45,11 @@ class Choice:
     reuse: bool = False
     guided: bool = False
     hint: str | None = None  # what may pay besides
+
+    @property
+    def ways(self) -> int:
+        """In how many ways a path goes on for itself: branches of shared paths are not told apart."""
+        return 1 if self.reuse else self.branches
 
 
 def learn_guide(settings: Settings, scene: CompiledScene, camera: Camera) -> GuideTable | None:
@@ -98,22 +100,19 @@ def choose(
 
 def _tried(settings: Settings, scene: CompiledScene, camera: Camera, trial: Trial, plain: Choice) -> Choice:
     """Return whether pixels share paths, or else how many branches these have; `plain` is neither."""
-    found = trial.run(1, False, plain.guided)
+    found = trial.run(False, plain.guided)
     light_is_rare = found.mean_variance(OUTLIERS_OF_SHARED) > RARE_LIGHT
     plain = replace(plain, hint=GUIDE_HINT if light_is_rare and not plain.guided else None)
+    branched = _branched(settings, trial, plain)
     if not _may_reuse(settings, camera) or not _may_gain(scene, found, light_is_rare):
-        return _branched(settings, trial, plain)
-    shared = replace(plain, reuse=True)
-    cost = _cost(trial, shared, plain, OUTLIERS_OF_SHARED)
-    if cost < CLEAR_GAIN:
-        return shared
-    branched = plain if light_is_rare else _branched(settings, trial, plain)
-    over_branched = _cost(trial, shared, branched, OUTLIERS_OF_SHARED)
+        return branched
+    branched, shared = plain if light_is_rare else branched, replace(plain, reuse=True)
+    cost = _cost(trial, shared, branched, OUTLIERS_OF_SHARED)
     if shares_all(scene):  # a few noisy pixels, which the trial may miss, are what sharing gains most in
-        error = _run(trial, shared).cost_error(_run(trial, branched), OUTLIERS_OF_SHARED)
-        return shared if over_branched - error < GAIN else branched
-    limit = GAIN if light_is_rare else GAIN_BESIDE_GLOSS
-    return shared if over_branched < GAIN and cost < limit else branched
+        cost -= _run(trial, shared).cost_error(_run(trial, branched), OUTLIERS_OF_SHARED, 1, branched.ways)
+    elif not light_is_rare and _cost(trial, shared, plain, OUTLIERS_OF_SHARED) >= GAIN_BESIDE_GLOSS:
+        return branched
+    return shared if cost < GAIN else branched
 
 
 def _may_gain(scene: CompiledScene, found: Run, light_is_rare: bool) -> bool:
@@ -127,22 +126,20 @@ def _may_gain(scene: CompiledScene, found: Run, light_is_rare: bool) -> bool:
 def _branched(settings: Settings, trial: Trial, choice: Choice) -> Choice:
     """Return a choice with as many branches as pay; paths from sensors have no first ray to share."""
     if settings.values["branches"] == AUTO and not choice.reuse and trial.of_picture:
-        for branches in (2, MOST_BRANCHES):
-            more = replace(choice, branches=branches)
-            if _cost(trial, more, choice) >= GAIN_OF_BRANCHES:
-                break
-            choice = more
+        costs = [_cost(trial, replace(choice, branches=each), choice) for each in BRANCHES]
+        if min(costs) < GAIN_OF_BRANCHES:
+            return replace(choice, branches=BRANCHES[costs.index(min(costs))])
     return choice
 
 
 def _cost(trial: Trial, one: Choice, other: Choice, outliers: float = OUTLIERS) -> float:
     """Return variance times rays of a choice over that of another."""
-    return _run(trial, one).cost(_run(trial, other), outliers)
+    return _run(trial, one).cost(_run(trial, other), outliers, one.ways, other.ways)
 
 
 def _run(trial: Trial, choice: Choice) -> Run:
     """Return the run of a choice."""
-    return trial.run(choice.branches, choice.reuse, choice.guided)
+    return trial.run(choice.reuse, choice.guided)
 
 
 def _tries_something(settings: Settings, scene: CompiledScene, camera: Camera) -> bool:

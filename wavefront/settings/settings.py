@@ -12,7 +12,7 @@ from ..core.errors import SceneError, one_of
 from ..film.aov_names import CLAMPED, GUIDES, chosen_aovs, sampled_names
 from ..film.exact_sum import MAX_TERMS
 from ..integrators import INTEGRATORS, li_full
-from ..integrators.tuning import MOST_BRANCHES
+from ..integrators.tuning import BRANCHES
 from ..sampling.sampler import SAMPLERS, SamplerMaker, make_sampler
 from ..scheduling.budget import Budget, make_budget
 from ..scheduling.executors import ExecutorLike, choose_executor, worker_count
@@ -137,7 +137,7 @@ class Settings:
     @property
     def most_branches(self) -> int:
         """The most branches that a path may have."""
-        return MOST_BRANCHES if isinstance(self.values["branches"], str) else self.values["branches"]
+        return BRANCHES[-1] if isinstance(self.values["branches"], str) else self.values["branches"]
 
     def sampler_maker(self) -> SamplerMaker:
         """Return what makes the sampler of a picture, given a seed and how many pixels wide it is."""
