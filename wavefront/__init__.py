@@ -85,6 +85,7 @@ from .shapes import (
     Points,
     Rectangle,
     Shape,
+    SignedDistanceGrid,
     Sphere,
     Spheres,
 )
@@ -225,6 +226,7 @@ __all__ = [
     "ShadowCatcher",
     "Shape",
     "Sides",
+    "SignedDistanceGrid",
     "Sky",
     "Sphere",
     "Spheres",

@@ -76,7 +76,7 @@ BAD = [
     (wf.Environment, {}, {"radiance": INF}, r"Environment radiance is inf"),
     (wf.Environment, {}, {"radiance": (1, 2, 3, 4)}, r"Environment radiance must have shape \(3,\), got \(4,\)"),
     (wf.Scene, {}, {"shapes": []}, r"the scene has no shapes"),
-    (wf.Scene, {}, {"shapes": [wf.Sphere((0, 0, 0), 1), "ball"]}, r"shapes\[1\] is 'ball'; it must be one of wf.Mesh, wf.Rectangle, wf.Disk, wf.Sphere, wf.Spheres, wf.Cylinders, wf.Capsules, wf.Instance"),
+    (wf.Scene, {}, {"shapes": [wf.Sphere((0, 0, 0), 1), "ball"]}, r"shapes\[1\] is 'ball'; it must be one of wf.Mesh, wf.Rectangle, wf.Disk, wf.Sphere, wf.Spheres, wf.Cylinders, wf.Capsules, wf.SignedDistanceGrid, wf.Instance"),
     (wf.Scene, {}, {"shapes": ["a.obj"]}, r"; wf.load\(path\) reads a file as a scene$"),
     (wf.Scene, {}, {"shapes": [wf.PointLight((0, 0, 0), 1)]}, r"; lights are given as lights="),
     (wf.Scene, {"shapes": wf.Sphere((0, 0, 0), 1)}, {"lights": wf.Sphere((0, 0, 0), 1)}, r"; emitting shapes belong to the shapes$"),

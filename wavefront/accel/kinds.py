@@ -6,10 +6,16 @@ from ..core.errors import SceneError
 from ..shapes import CurvedShape
 from .capsule import CapsulePrimitives
 from .cylinder import CylinderPrimitives
+from .distance_grid import DistanceGridPrimitives
 from .primitives import CurvedPrimitives
 from .sphere import SpherePrimitives
 
-KINDS: tuple[type[CurvedPrimitives], ...] = (SpherePrimitives, CylinderPrimitives, CapsulePrimitives)
+KINDS: tuple[type[CurvedPrimitives], ...] = (
+    SpherePrimitives,
+    CylinderPrimitives,
+    CapsulePrimitives,
+    DistanceGridPrimitives,
+)
 
 
 def kind_of(shape: CurvedShape) -> type[CurvedPrimitives]:

@@ -71,9 +71,10 @@ class Primitives(SoA, ABC):
 
 
 class CurvedPrimitives(Primitives):
-    """k primitives of one kind that are not triangles. Only their first two hits along a line count."""
+    """k primitives of one kind that are not triangles."""
 
     shapes: ClassVar[tuple[type[CurvedShape], ...]]  # the shapes that are made of such primitives
+    shading_normals: ClassVar[bool] = False  # whether these may differ from the normals of the surface
 
     @property
     def balls(self) -> tuple[Floats, Floats]:
@@ -100,6 +101,10 @@ class CurvedPrimitives(Primitives):
 
         Points are moved onto the surface, and their error bounds (n,) corrected, in place.
         """
+
+    def shading(self, prim: Ints, point: Floats, normal: Floats) -> Floats:
+        """Return unit shading normals (3, n) at points of the surface, given its normals (3, n)."""
+        return normal
 
     @abstractmethod
     def uv(self, prim: Ints, point: Floats) -> Floats:

@@ -59,6 +59,18 @@ class CurvedTable:
             error[lanes] = bound
         return normal
 
+    @property
+    def shading_normals(self) -> bool:
+        """Whether any shading normals may differ from the normals of the surface."""
+        return any(kind.shading_normals for kind in self.kinds)
+
+    def shading(self, prim: Ints, point: Floats, normal: Floats) -> Floats:
+        """Return shading normals (3, n), given those of the surface (3, n)."""
+        values = np.empty_like(normal)
+        for kind, lanes, own in self._by_kind(prim):
+            values[:, lanes] = kind.shading(own, take(point, lanes), take(normal, lanes))
+        return values
+
     def uv(self, prim: Ints, point: Floats) -> Floats:
         """Return texture coordinates, (2, n)."""
         values = np.empty((2, prim.size), f4)

@@ -86,6 +86,11 @@ class CompiledScene:
         """Whether any value is interpolated over triangles."""
         return bool(self.attributes) or self.corner_normals is not None
 
+    @property
+    def shading_normals(self) -> bool:
+        """Whether any shading normals may differ from the normals of the surface."""
+        return self.corner_normals is not None or self.curved.shading_normals
+
     def view(self, camera: Camera) -> Camera:
         """Return a camera of the scene in the unit of length of these arrays.
 

@@ -57,7 +57,7 @@ def _colors_or(convert: Any, high: float = FLOAT32_MAX) -> Any:
     return check
 
 
-def _transform(name: str, value: Any) -> Doubles:
+def grid_transform(name: str, value: Any) -> Doubles:
     """Return the matrix (4, 4) from the unit cube."""
     if np.shape(value) == (2, 3):
         low, high = finite_array(name, value, (2, 3))
@@ -123,7 +123,7 @@ class GridMedium(BaseMedium):
     """
 
     density: Parameter[ArrayLike] = Parameter(_colors_or(_grid))
-    transform: Parameter[ArrayLike] = Parameter(_transform, default=((0, 0, 0), (1, 1, 1)))
+    transform: Parameter[ArrayLike] = Parameter(grid_transform, default=((0, 0, 0), (1, 1, 1)))
     absorption: Parameter[ArrayLike] = Parameter(_coefficient, default=0.0)
     scattering: Parameter[ArrayLike] = Parameter(_coefficient, default=0.0)
     albedo: Parameter[ArrayLike | None] = Parameter(_colors_or(_albedo, 1.0), default=None, kw_only=True)

@@ -12,7 +12,7 @@ from ..core.html import table_html
 from ..core.parameter import brief
 from ..core.plural import plural
 from ..lights import Light
-from ..shapes import Instance, Mesh, PrimitiveArray, Shape
+from ..shapes import CurvedShape, Instance, Mesh, Shape
 
 
 def scene_html(
@@ -55,9 +55,7 @@ def _counts(shapes: Sequence[Shape], lights: Sequence[Light]) -> list[str]:
 
 
 def _curved(shape: Shape) -> int:
-    if isinstance(shape, PrimitiveArray):
-        return shape.count
-    return 0 if isinstance(shape, Mesh) else 1
+    return shape.count if isinstance(shape, CurvedShape) else 0
 
 
 def _material_rows(shapes: Sequence[Shape]) -> list[list[Any]]:

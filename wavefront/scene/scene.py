@@ -47,8 +47,9 @@ class Scene:
     Parameters
     ----------
     shapes
-        `Mesh`, `Sphere`, `Spheres`, `Cylinders`, `Capsules` and `Instance` objects, and what functions such
-        as `Rectangle` return; shapes with an emission are lights. Objects of trimesh are converted.
+        `Mesh`, `Sphere`, `Spheres`, `Cylinders`, `Capsules`, `SignedDistanceGrid` and `Instance` objects, and
+        what functions such as `Rectangle` return; shapes with an emission are lights. Objects of trimesh are
+        converted.
     lights
         `PointLight`, `SpotLight`, `DirectionalLight` and `Environment` objects, or any `Light`; at most one
         `Environment`. A scene without light is lit as in a studio: see `render`.
@@ -395,8 +396,8 @@ class Shapes(CheckedList[Shape]):
 
     name = "shapes"
     allowed = (
-        "wf.Mesh, wf.Rectangle, wf.Disk, wf.Sphere, wf.Spheres, wf.Cylinders, wf.Capsules, wf.Instance, "
-        "or a mesh or scene of trimesh"
+        "wf.Mesh, wf.Rectangle, wf.Disk, wf.Sphere, wf.Spheres, wf.Cylinders, wf.Capsules, "
+        "wf.SignedDistanceGrid, wf.Instance, or a mesh or scene of trimesh"
     )
 
     def converted(self, item: Any) -> list[Shape] | None:

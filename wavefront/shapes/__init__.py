@@ -4,6 +4,7 @@ from .arrays import PrimitiveArray
 from .base import CurvedShape, Shape
 from .box import Box, GridBox, Plane
 from .disk import Disk
+from .distance_grid import SignedDistanceGrid
 from .height_field import HeightField
 from .instance import Instance
 from .mesh import Mesh, Rectangle
@@ -28,6 +29,7 @@ __all__ = [
     "PrimitiveArray",
     "Rectangle",
     "Shape",
+    "SignedDistanceGrid",
     "Sphere",
     "Spheres",
 ]

@@ -60,7 +60,7 @@ def _on_surfaces(scene: CompiledScene, rays: Rays, hits: Hits) -> SurfaceInterac
     ng = normals(scene, hits.prim, point, error)
     if instances is not None:
         ng, error = _normals_to_scene(instances, hits, ng, error)
-    ns = _shading_normals(scene, hits, instances, ng)
+    ns = _shading_normals(scene, hits, instances, ng, point)
     facing = dot(ng, wo)
     side, back_facing = signs(facing), np.signbit(facing)
     ng = ng * side
@@ -151,11 +151,25 @@ def face_viewer(wo: Floats, ns: Floats) -> Floats:
 
 
 def _shading_normals(
-    scene: CompiledScene, hits: Hits, instances: InstanceTable | None, ng: Floats
+    scene: CompiledScene, hits: Hits, instances: InstanceTable | None, ng: Floats, point: Floats
 ) -> Floats | None:
-    """Return the interpolated vertex normals, (3, n); None if no mesh of the scene has any."""
-    if scene.corner_normals is None:
+    """Return the shading normals, (3, n); None where they are those of the surface in all of the scene."""
+    if not scene.shading_normals:
         return None
+    ns = _interpolated_normals(scene, hits, instances, ng)
+    round_ = np.flatnonzero(hits.prim >= scene.triangles)
+    if scene.curved.shading_normals and round_.size:
+        prim = hits.prim.take(round_) - scene.triangles
+        ns[:, round_] = scene.curved.shading(prim, point.take(round_, 1), ng.take(round_, 1))
+    return ns
+
+
+def _interpolated_normals(
+    scene: CompiledScene, hits: Hits, instances: InstanceTable | None, ng: Floats
+) -> Floats:
+    """Return the interpolated vertex normals, (3, n), and `ng` where there are none."""
+    if scene.corner_normals is None:
+        return ng.copy()
     corners = _at_corners(scene.corner_normals, hits, scene.triangles)
     if instances is not None:
         # Each is normalized, as in a mesh of its own: a skewed transform changes their lengths.

@@ -81,7 +81,7 @@ def shared_points(
     lanes = np.flatnonzero(~paths.specular & shareable)
     surface = interaction(scene, paths.take(lanes), hits.take(lanes))
     good = np.ones(lanes.size, np.bool_)
-    if scene.corner_normals is not None:
+    if scene.shading_normals:
         good &= dot(surface.ns, surface.wo) > GRAZING
     if scene.absorption is not None:
         good &= ~surface.back_facing
@@ -390,7 +390,7 @@ def connect(
     direction *= inverse
     cos_target = dot(-ng, direction)
     possible = first.present & there & distinct & (cos_target > 0)
-    if scene.corner_normals is not None:
+    if scene.shading_normals:
         possible &= -dot(target.ns[:, None], direction) > GRAZING
     wi = direction.reshape(3, -1)
     f, pdf = first.evaluate(wi)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from copy import deepcopy
 from dataclasses import replace
 from typing import Any
@@ -11,15 +12,16 @@ import numpy as np
 from ...arrays.elementary import sin_cos_turns
 from ...arrays.vec import Doubles
 from ...bsdfs import Diffuse, Sides
-from ...core.errors import SceneError
+from ...core.errors import SceneError, as_array
 from ...materials import Material
-from ...shapes import Cylinders, Instance, Mesh, Shape, Sphere
+from ...shapes import CurvedShape, Cylinders, Instance, Mesh, Shape, SignedDistanceGrid, Sphere
 from ...shapes.transform import Matrix
 from ...textures.image import Texture
 from ..conversion import textures_in
 from ..joining import stacked
 from ..placing import moved_raw
 from ..repair import RawMesh, build
+from ..volumes import parsed_grid
 from .attributes import with_attribute
 from .bsdfs import is_one_sided
 from .media import interior_of
@@ -142,6 +144,24 @@ def _serialized(node: Node, job: Job) -> list[Shape]:
     return _mesh(node, job, raw, smooth=True)
 
 
+@plugin("sdfgrid", "shape", "to_world filename grid normals", PARTS)
+def _distance_grid(node: Node, job: Job) -> list[Shape]:
+    if "filename" in node.values:
+        path = job.find(node.text("filename"))
+        values, _ = parsed_grid(os.fspath(path), job.files.read(path), job.files.budget)
+    else:
+        values = as_array("grid", node.get("grid"))
+        if values.ndim != 4 or values.shape[3] != 1:
+            raise SceneError(f"grid has shape {values.shape}; it must have shape (z, y, x, 1)")
+        values = values[..., 0]
+    material, emission = _appearance(node, job)
+    if emission is not None:
+        raise SceneError("has an area light; it cannot emit light")
+    smooth = node.choice("normals", "smooth", ("analytic", "smooth")) == "smooth"
+    name = node.id or "sdfgrid"
+    return [SignedDistanceGrid(values, node.matrix(), smooth=smooth, material=material, name=name)]
+
+
 @plugin("shapegroup merge", "shape", holds="shape")
 def _group(node: Node, job: Job) -> list[Shape]:
     """Return its shapes, which are placed by instances."""
@@ -163,14 +183,14 @@ def _instance(node: Node, job: Job) -> list[Shape]:
             raise SceneError(f"makes more than {most} instances; the limit is LoadLimits.instances")
         if isinstance(shape, Mesh):
             placed.append(Instance(shape, matrix, name=node.id or None))
-        elif isinstance(shape, Sphere | Cylinders):
-            placed.append(shape.placed(matrix))
+        elif isinstance(shape, CurvedShape):
+            placed.append(shape.transformed(matrix))
         else:
             raise SceneError("its group holds an instance; instances of instances are not supported")
     return placed
 
 
-unsupported("bsplinecurve linearcurve ellipsoids ellipsoidsmesh sdfgrid", "shape")
+unsupported("bsplinecurve linearcurve ellipsoids ellipsoidsmesh", "shape")
 
 
 def _mesh(node: Node, job: Job, raw: RawMesh, smooth: bool = False, closed: bool = False) -> list[Shape]:
