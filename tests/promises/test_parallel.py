@@ -10,6 +10,7 @@ import sys
 import threading
 import time
 from collections.abc import Callable, Iterator
+from concurrent.futures import BrokenExecutor
 from multiprocessing.connection import Connection
 from pathlib import Path
 from typing import Any
@@ -26,6 +27,7 @@ from wavefront.core.shared import STOP, SharedInt, Stopped
 from wavefront.scheduling import executors
 from wavefront.scheduling.executors import MIN_PATHS, MIN_PATHS_TO_SPAWN, choose_executor, worker_count
 from wavefront.scheduling.pool import WorkerPool
+from wavefront.scheduling.processes import ProcessPool
 
 LINUX = sys.platform.startswith("linux")
 EXECUTORS = ["threads", pytest.param("processes", marks=pytest.mark.skipif(not LINUX, reason="needs fork"))]
@@ -118,6 +120,14 @@ def test_processes_that_die_again_and_again_are_an_error() -> None:
     with pytest.raises(wf.RenderError, match=r"worker processes died 3 times, at last with \d .*memory"):
         run(work, range(8), 2, "processes")
     assert not multiprocessing.active_children()
+
+
+@processes
+def test_a_job_handed_to_processes_that_have_died_fails_by_its_future() -> None:
+    pool = ProcessPool("fork", 1, SharedInt())
+    died = [pool.submit(os._exit, 1).exception(30), pool.submit(int).exception(30)]
+    pool.shutdown([])
+    assert all(isinstance(error, BrokenExecutor) for error in died)
 
 
 @processes

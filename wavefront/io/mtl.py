@@ -14,9 +14,9 @@ How an MTL material is read:
   the roughness is 1, where Blender has 0 if `illum` is 2. Below a reflectance of 0.02 the coat is also
   weaker at grazing angles, as in S. Lagarde and C. de Rousiers 2014, "Moving Frostbite to PBR". `map_Ks`
   counts by its luminance.
-- `Pr Pm Ps Pc Pcr aniso` and their maps, `norm` and `map_d` (the PBR extension) are the parameters of
-  the same names of `Principled`. `Pr` replaces `Ns`. Beside `Pr` or `Pm`, a surface without a highlight
-  keeps the default one of reflectance 0.04.
+- `Pr Pm Ps Pc Pcr` and their maps, `norm` and `map_d` (the PBR extension) are parameters of `Principled`;
+  `aniso` and its map are named in a warning. `Pr` replaces `Ns`. Beside `Pr` or `Pm`, a surface without a
+  highlight keeps the default one of reflectance 0.04.
 - Opacity is `d`; without a `d` it is 1 - `Tr`, except that `Tr 1` alone means opaque: that is how
   MeshLab writes it, and an invisible material would be useless. A surface that is less
   than opaque and has an index `Ni` other than 1 is glass.

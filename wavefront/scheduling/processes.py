@@ -28,7 +28,7 @@ from ..core.interrupt import SIGNALS
 from ..core.shared import AT_ONCE, SharedInt
 from .heap import prepare_heap
 from .remote import RemoteWorkers
-from .workers import POLL_INTERVAL, LocalWorkers, StoppableWork, all_done
+from .workers import POLL_INTERVAL, LocalWorkers, StoppableWork, all_done, submitted
 
 END_TIMEOUT = 1.0  # seconds that processes have to end by themselves
 TERM_TIMEOUT = 0.2  # seconds from SIGTERM to SIGKILL
@@ -74,7 +74,9 @@ class ProcessPool:
         self._pool = ProcessPoolExecutor(self._count, context, _initialize_worker, (work,))
 
     def submit(self, function: Callable[..., Any], /, *args: Any) -> Future[Any]:
-        """Have the first process that is free call a function; processes start with the first tasks.
+        """Have the first process that is free call a function; if all are lost, the future says so.
+
+        Processes start with the first tasks.
 
         The future cannot be canceled: set the stop flag to end jobs early.
         """
@@ -84,7 +86,7 @@ class ProcessPool:
                 stack.enter_context(self._context.starting())
                 stack.enter_context(_blocking_signals())
                 stack.enter_context(_forking() if self._forks else _without_main())
-            self._pool.submit(function, *args).add_done_callback(answer.follow)
+            submitted(self._pool, function, *args).add_done_callback(answer.follow)
         return answer
 
     def shutdown(self, running: Collection[Future[Any]]) -> None:

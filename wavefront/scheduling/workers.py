@@ -131,12 +131,7 @@ class ExecutorTasks:
 
     def submit(self, function: Callable[..., Any], /, *args: Any) -> Future[Any]:
         """Have the first worker that is free call a function; if all are lost, the future says so."""
-        try:
-            return self._executor.submit(function, *args)
-        except BrokenExecutor as error:
-            failed: Future[Any] = Future()
-            failed.set_exception(error)
-            return failed
+        return submitted(self._executor, function, *args)
 
     def shutdown(self, running: Collection[Future[Any]]) -> None:
         """Withdraw jobs that have not begun, and wait for the others; for those of a caller a moment.
@@ -147,6 +142,16 @@ class ExecutorTasks:
             self._executor.shutdown(wait=all_done(running, math.inf, self._stop))
         else:
             all_done(running, END_TIMEOUT, self._stop)
+
+
+def submitted(executor: Executor, function: Callable[..., Any], /, *args: Any) -> Future[Any]:
+    """Hand a function to an executor; if all its workers are lost, the future says so."""
+    try:
+        return executor.submit(function, *args)
+    except BrokenExecutor as error:
+        failed: Future[Any] = Future()
+        failed.set_exception(error)
+        return failed
 
 
 def shares_memory(executor: Executor, stop: SharedInt) -> bool:
