@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from functools import cache
 
 import numpy as np
@@ -18,25 +18,34 @@ ROOTS = 0.6 * np.linspace(0, 1, 13) ** 2  # of the reflectance along the normal,
 
 def lookup(table: Floats, roughness: Floats, cos: Floats) -> Floats:
     """Bilinear value of a table (SIZE, SIZE) at roughness and cosine (n,), (n,)."""
-    return interpolate(table[None], roughness, np.sqrt(np.clip(cos, f4(0), f4(1))))
+    return interpolate(table[None], (roughness, np.sqrt(np.clip(cos, f4(0), f4(1)))))
 
 
-def interpolate(table: Floats, y: Floats | None, x: Floats, side: Bools | Ints | int = 0) -> Floats:
-    """Bilinear value of a table (sides, rows, columns) at y and x in [0, 1], (n,); one row needs no y."""
-    _, rows, columns = table.shape
-    flat = table.ravel()
-    x = np.clip(x, f4(0), f4(1)) * f4(columns - 1)
-    i = np.minimum(x.astype(np.intp), columns - 2)
-    x = x - i.astype(f4)
-    corner = i + side * (rows * columns)
-    if y is None:
-        return flat.take(corner) * (f4(1) - x) + flat.take(corner + 1) * x
-    y = np.clip(y, f4(0), f4(1)) * f4(rows - 1)
-    j = np.minimum(y.astype(np.intp), rows - 2)
-    y, corner = y - j.astype(f4), corner + j * columns
-    low = flat.take(corner) * (f4(1) - x) + flat.take(corner + 1) * x
-    high = flat.take(corner + columns) * (f4(1) - x) + flat.take(corner + columns + 1) * x
-    return low * (f4(1) - y) + high * y
+def interpolate(table: Floats, place: Sequence[Floats | None], side: Bools | Ints | int = 0) -> Floats:
+    """Multilinear value of a table (sides, ...) at a place in [0, 1] for each further axis, (n,).
+
+    For axes of one entry the place does not count.
+    """
+    stride, steps = table[0].size, []
+    start = side * stride
+    for size, x in zip(table.shape[1:], place, strict=True):
+        stride //= size
+        if size == 1:
+            continue
+        assert x is not None
+        x = np.clip(x, f4(0), f4(1)) * f4(size - 1)
+        i = np.minimum(x.astype(np.intp), size - 2)
+        start = start + i * stride
+        steps.append((stride, x - i.astype(f4)))
+    return _blended(table.ravel(), start, steps)
+
+
+def _blended(flat: Floats, start: Ints, steps: Sequence[tuple[int, Floats]]) -> Floats:
+    """Interpolate between entries from `start` on by each of the strides and parts."""
+    if not steps:
+        return flat.take(start)
+    (stride, x), *rest = steps
+    return _blended(flat, start, rest) * (f4(1) - x) + _blended(flat, start + stride, rest) * x
 
 
 def cosine_mean(table: Floats) -> Floats:
@@ -70,7 +79,7 @@ def dielectric_albedo(ior: Floats, roughness: Floats, cos: Floats | None) -> Flo
     level = root.astype(np.intp)
     x = f4(0) if cos is None else np.sqrt(np.clip(cos, f4(0), f4(1)))
     tables = _dielectric_tables()[int(cos is None)]
-    low, high = (interpolate(tables, roughness, np.asarray(x, f4), level + k) for k in (0, 1))
+    low, high = (interpolate(tables, (roughness, np.asarray(x, f4)), level + k) for k in (0, 1))
     return low + (high - low) * (root - level.astype(f4))
 
 

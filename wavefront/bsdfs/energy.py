@@ -13,8 +13,8 @@ times the mean transmittance: f·η² stays reciprocal.
 
 from __future__ import annotations
 
-from functools import cache
-from typing import TYPE_CHECKING, NamedTuple, TypeAlias
+from functools import cache, partial
+from typing import TYPE_CHECKING, Any, NamedTuple, TypeAlias
 
 import numpy as np
 
@@ -32,10 +32,10 @@ if TYPE_CHECKING:
 
 COLUMNS = 32  # of a table, by the angle to the normal
 FINE = 1024  # of a table of one row, in the end
-ROUGHNESSES = 16  # rows of a table for textures: roughnesses in [0, 1]
-TURNS = np.linspace(0, 1, 6)  # rows of a table of two roughnesses: cos² of azimuths
-NORMALS = 256  # microfacets that each entry of a table sums over, and `NORMALS_OF_ONE` in a table of one row
-NORMALS_OF_ONE = 1024
+# roughnesses of tables for textures, where polynomials of them are stable (Chebyshev), and in the end
+NODES = 0.5 - 0.5 * np.cos(np.pi * (np.arange(7) + 0.5) / 7)
+ROUGHNESSES = np.linspace(0, 1, 25)
+TURNS = 6  # rows of a table of two roughnesses: cos² of azimuths in [0, 1]
 GOLDEN = 0.6180339887498949  # (√5 − 1)/2, whose multiples are spread evenly
 MIDPOINTS, AROUND = 512, 16  # of roots of cosines, and of azimuths, for means
 STEPS = 8  # to c, each of which halves the error or more
@@ -47,6 +47,15 @@ MEAN = (
     (0.9114120404872960, 0.4018638274079180),
 )
 
+
+class Size(NamedTuple):
+    """The size of the table of a roughness or two."""
+
+    turns: int
+    columns: int
+    normals: int  # microfacets that each entry sums over
+
+
 Place: TypeAlias = tuple[Floats | None, Floats]  # row, in a table of two roughnesses, and column, in [0, 1]
 
 
@@ -54,30 +63,35 @@ class Shape(NamedTuple):
     """What tables depend on, beside an index of refraction."""
 
     alpha: float | None  # None: all roughnesses, for textures
-    alpha_v: float | None
+    alpha_v: float | None  # the same across, if it is brushed
     beckmann: bool
     separable: bool
+    brushed: bool = False  # two roughnesses
+
+
+# Tables have axes for the side, `roughness`, `roughness_v`, the azimuth and the angle to the normal; axes of
+# what is constant or does not count have one entry.
 
 
 class Scaling(NamedTuple):
     """How reflection grows."""
 
-    factor: Floats  # (1, rows, columns) c
-    albedo: Floats  # (1, r) mean of what is scattered once, of each roughness
+    factor: Floats  # (1, …) c
+    albedo: Floats  # (1, r, r) mean of what is scattered once
 
 
 class Loss(NamedTuple):
     """The lobe of what a boundary that refracts loses; its sides are outside and inside."""
 
-    lost: Floats  # (2, rows, columns) L
-    means: Floats  # (2, r) of L, of each roughness, times the square of the index of the side
+    lost: Floats  # (2, …) L
+    means: Floats  # (2, r, r) of L, times the square of the index of the side
     passed: float  # mean transmittance of a smooth boundary
     ior: float
 
     def at(self, bsdf: Microfacets, w: Floats, inside: Bools, stretched: Floats | None = None) -> Floats:
         """Return L of directions w (3, n) on the inside or not, and of a σ, if it is known, (n,)."""
         place = _place_of_refraction(bsdf.facets(), w, stretched)
-        return _directional(bsdf, self.lost, place, bsdf.mean_roughness, inside)
+        return _directional(bsdf, self.lost, place, inside)
 
     def lobe(
         self,
@@ -107,7 +121,7 @@ class Loss(NamedTuple):
 
     def _sides(self, bsdf: Microfacets, inside: Bools, below: Bools | bool) -> tuple[Floats, Floats]:
         """Return the part of the lobe on a side of the boundary, and what products of L are scaled by."""
-        out, in_ = (_of_roughness(self.means, bsdf.mean_roughness, side) for side in (0, 1))
+        out, in_ = (_of_roughness(bsdf, self.means, side) for side in (0, 1))
         least, squared = f4(self.passed) * np.minimum(out, in_), f4(self.ior * self.ior)
         cross = least / out, least / in_
         parts = f4(1) - cross[0], cross[0], f4(1) - cross[1], cross[1]  # outside, above and below; inside
@@ -142,7 +156,7 @@ def gain(
     """
     table, facets = scaling(bsdf.shape).factor, bsdf.facets()
     places = (_place_of_masking(facets, *each) for each in zip((wo, wi), stretched, strict=True))
-    one, other = (_directional(bsdf, table, place, bsdf.masking_roughness) for place in places)
+    one, other = (_directional(bsdf, table, place) for place in places)
     if mean_reflectance is None:
         return one * other
     return f4(1) + (one * other - f4(1)) * part_kept(bsdf, mean_reflectance)
@@ -153,7 +167,7 @@ def part_kept(bsdf: Microfacets, mean_reflectance: Floats) -> Floats:
 
     It is F·M/(1 − F·(1 − M)), with M the mean albedo of single scattering (Kulla and Conty).
     """
-    mean = _of_roughness(scaling(bsdf.shape).albedo, bsdf.masking_roughness)
+    mean = _of_roughness(bsdf, scaling(bsdf.shape).albedo)
     return mean_reflectance * mean / (f4(1) - mean_reflectance * (f4(1) - mean))
 
 
@@ -166,68 +180,123 @@ def _place_of_masking(facets: Facets, w: Floats, stretched: Floats | None = None
 def _place_of_refraction(facets: Facets, w: Floats, stretched: Floats | None = None) -> Place:
     """Return where directions w (3, n) are in `Loss`: masking follows stretched ones, refraction does not."""
     z, size = np.abs(w[2]), facets.stretched(w) if stretched is None else stretched
-    return facets.turn(w), np.sqrt(np.minimum(f4(0.5) * (z + z / size), f4(1)))
+    return facets.turn(w), _column_of_refraction(z, size)
 
 
-def _directional(
-    bsdf: Microfacets, table: Floats, place: Place, roughness: Callable[[], Floats], side: Bools | int = 0
-) -> Floats:
-    """Return what a table (sides, rows, columns) has for directions at a place, (n,)."""
+def _column_of_refraction(z: Any, stretched: Any) -> Any:
+    """Return the column in `Loss` of cosines and σ: evenly by cosines, but more where masking changes."""
+    return z * (z * f4(0.4) + f4(0.4)) + np.sqrt(z / stretched) * f4(0.2)
+
+
+def _directional(bsdf: Microfacets, table: Floats, place: Place, side: Bools | int = 0) -> Floats:
+    """Return what a table (sides, …) has for directions at a place, (n,)."""
     turn, column = place
-    if table.shape[1] == 1:
+    if table.shape[-1] == FINE:
         nearest = (column * f4(FINE - 1) + f4(0.5)).astype(np.intp)
         return table.ravel().take(nearest + side * FINE)
-    return interpolate(table, roughness() if bsdf.shape.alpha is None else turn, column, side)
+    return interpolate(table, (bsdf.roughness, bsdf.roughness_v, turn, column), side)
 
 
-def _of_roughness(table: Floats, roughness: Callable[[], Floats], side: Bools | int = 0) -> Floats:
-    """Return what a table (sides, r) has for a roughness, (n,) or (1,)."""
-    if table.shape[1] == 1:
-        return table.ravel().take(np.atleast_1d(side).astype(np.intp))
-    return interpolate(table[:, None], None, roughness(), side)
+def _of_roughness(bsdf: Microfacets, table: Floats, side: Bools | int = 0) -> Floats:
+    """Return what a table (sides, r, r) has for the roughnesses of a BSDF, (n,) or (1,)."""
+    return interpolate(table, (bsdf.roughness, bsdf.roughness_v), np.atleast_1d(side))
 
 
 @cache
 def scaling(shape: Shape) -> Scaling:
     """Return the table of surfaces that reflect, or let pass without bending."""
-    x = np.linspace(0, 1, COLUMNS)
-    kernels, turns = [], len(_rows(shape)) if shape.alpha_v else 1
-    for facets, alpha, across, turn in _rows(shape):
-        turned = turn * across**2 / (turn * across**2 + (1 - turn) * alpha**2)
-        toward = np.sqrt(turned * alpha**2 + (1 - turned) * across**2) * x
-        wo, m = _visible(facets, turned, toward / np.sqrt(toward**2 + 1 - x * x), shape)
-        wi = reflect(wo, m)
-        weight = np.where(wi[2] > 0, facets.weight(wo, wi, m), f4(0)).astype(float)
-        row, column = _place_of_masking(facets, wi)
-        corners = _neighbors(column, COLUMNS)
-        if row is not None:
-            corners = [(j * COLUMNS + i, y * x) for j, y in _neighbors(row, turns) for i, x in corners]
-        total = turns * COLUMNS
-        start = np.arange(COLUMNS).repeat(weight.size // COLUMNS) * total
-        parts = [np.bincount(start + i, weight * part, COLUMNS * total) for i, part in corners]
-        kernels.append(sum(parts[1:], parts[0]).reshape(COLUMNS, total) * (COLUMNS / weight.size))
-    kernel = np.array(kernels).reshape(-1, turns * COLUMNS, turns * COLUMNS)  # roughnesses do not mix
-    factor = np.ones(kernel.shape[:2])
-    for _ in range(STEPS):
-        factor = np.sqrt(factor / (kernel * factor[:, None]).sum(2))
-    once = kernel.sum(2).reshape(1, -1, COLUMNS)
-    albedo = _means(shape, once, _place_of_masking)
-    return Scaling(_fine(factor.reshape(once.shape)), albedo.astype(np.float32))
+    factor, albedo = _tabulate(shape, _scaling_of_pair)
+    return Scaling(_fine(factor), albedo.astype(np.float32))
 
 
 @cache
 def loss(shape: Shape, ior: float) -> Loss:
     """Return the table of a boundary of an index of refraction, inside relative to outside."""
-    factor, rows = scaling(shape).factor, _rows(shape)
-    cos, places = np.linspace(0, 1, 2048) ** 2, np.linspace(0, 1, COLUMNS)
-    lost = np.empty((2, len(rows), COLUMNS))
-    for k, (facets, alpha, across, turn) in enumerate(rows):
+    size = Size(1, COLUMNS, 1024 if shape.alpha else 512)
+    if shape.brushed:  # total reflection ends abruptly across
+        size = Size(24, 48, 512) if shape.alpha and shape.alpha_v else Size(16, 32, 256)
+    lost, means = _tabulate(shape, partial(_loss_of_pair, ior=ior, size=size))
+    denser = np.full(1, max(ior, 1 / ior), f4)
+    passed = 1 - float(mean_over_cosines(lambda mu: fresnel_dielectric(mu, denser)[0])[0])
+    return Loss(_fine(np.clip(lost, LEAST, 1)), means.astype(np.float32), passed, ior)
+
+
+def _tabulate(shape: Shape, pair: Callable[[Shape], tuple[Doubles, Doubles]]) -> list[Doubles]:
+    """Return the tables that `pair` gives for constants, of all roughnesses that vary: (sides, r, r, …)."""
+    along, across = _roughnesses(shape.alpha), _roughnesses(shape.alpha_v) if shape.brushed else [None]
+    parts = [[pair(shape._replace(alpha=a, alpha_v=b)) for b in across] for a in along]
+    tables = [np.array([[each[k] for each in row] for row in parts]) for k in (0, 1)]
+    for axis in (0, 1):
+        tables = [_at_roughnesses(table, axis) for table in tables]
+    return [np.moveaxis(table, 2, 0) for table in tables]
+
+
+def _roughnesses(alpha: float | None) -> list[float]:
+    return alpha_of(NODES.astype(f4)).tolist() if alpha is None else [alpha]
+
+
+def _at_roughnesses(table: Doubles, axis: int) -> Doubles:
+    """Return a table of `NODES` along an axis at `ROUGHNESSES`, by the polynomial through them."""
+    if table.shape[axis] == 1:
+        return table
+    table, parts = np.moveaxis(table, axis, 0), np.ones((NODES.size, ROUGHNESSES.size))
+    for k, j in np.ndindex(NODES.size, NODES.size):
+        if j != k:
+            parts[k] *= (ROUGHNESSES - NODES[j]) / (NODES[k] - NODES[j])
+    total = sum(np.multiply.outer(part, each) for part, each in zip(parts, table, strict=True))
+    return np.moveaxis(total, 0, axis)
+
+
+@cache
+def _scaling_of_pair(shape: Shape) -> tuple[Doubles, Doubles]:
+    """Return c (1, turns, columns) and mean albedo (1,) of constants."""
+    if shape.brushed and shape.alpha < shape.alpha_v:
+        factor, albedo = _scaling_of_pair(shape._replace(alpha=shape.alpha_v, alpha_v=shape.alpha))
+        return factor[:, ::-1], albedo
+    x, facets = np.linspace(0, 1, COLUMNS), _facets(shape)
+    alpha, across = shape.alpha, shape.alpha_v or shape.alpha
+    kernels, turns = [], np.linspace(0, 1, TURNS) if shape.brushed else np.ones(1)
+    for turn in turns:
+        turned = turn * across**2 / (turn * across**2 + (1 - turn) * alpha**2)
+        toward = np.sqrt(turned * alpha**2 + (1 - turned) * across**2) * x
+        wo, m = _visible(
+            facets, turned, toward / np.sqrt(toward**2 + 1 - x * x), 256 if shape.brushed else 1024
+        )
+        wi = reflect(wo, m)
+        weight = np.where(wi[2] > 0, facets.weight(wo, wi, m), f4(0)).astype(float)
+        row, column = _place_of_masking(facets, wi)
+        corners = _neighbors(column, COLUMNS)
+        if row is not None:
+            corners = [(j * COLUMNS + i, y * x) for j, y in _neighbors(row, TURNS) for i, x in corners]
+        total = turns.size * COLUMNS
+        start = np.arange(COLUMNS).repeat(weight.size // COLUMNS) * total
+        parts = [np.bincount(start + i, weight * part, COLUMNS * total) for i, part in corners]
+        kernels.append(sum(parts[1:], parts[0]).reshape(COLUMNS, total) * (COLUMNS / weight.size))
+    kernel = np.concatenate(kernels)
+    factor = np.ones(len(kernel))
+    for _ in range(STEPS):
+        factor = np.sqrt(factor / (kernel * factor).sum(1))
+    albedo = _means(facets, kernel.sum(1).reshape(1, -1, COLUMNS), _place_of_masking)
+    return factor.reshape(1, -1, COLUMNS), albedo
+
+
+@cache
+def _loss_of_pair(shape: Shape, ior: float, size: Size) -> tuple[Doubles, Doubles]:
+    """Return L (2, turns, columns) and its means (2,), of constants."""
+    if shape.brushed and shape.alpha < shape.alpha_v:
+        lost, means = _loss_of_pair(shape._replace(alpha=shape.alpha_v, alpha_v=shape.alpha), ior, size)
+        return lost[:, ::-1], means
+    facets, (factor, _) = _facets(shape), _scaling_of_pair(shape)
+    table, alpha, across = factor.astype(f4), shape.alpha, shape.alpha_v or shape.alpha
+    cos, places = np.linspace(0, 1, 2048) ** 2, np.linspace(0, 1, size.columns)
+    turns = np.linspace(0, 1, size.turns) if shape.brushed else np.ones(1)
+    lost = np.empty((2, turns.size, size.columns))
+    for k, turn in enumerate(turns):
         toward2 = turn * alpha**2 + (1 - turn) * across**2
-        known = np.sqrt(0.5 * cos * (1 + 1 / np.sqrt(cos**2 + toward2 * (1 - cos**2))))
-        wo, m = _visible(facets, turn, np.interp(places, known, cos), shape)
+        known = _column_of_refraction(cos, np.sqrt(cos**2 + toward2 * (1 - cos**2)))
+        wo, m = _visible(facets, turn, np.interp(places, known, cos), size.normals)
         seen, wi = np.maximum(dot(wo, m), f4(0)), reflect(wo, m)
-        table = factor[:, k : k + 1] if shape.alpha is None else factor
-        one, other = (interpolate(table, *_place_of_masking(facets, w)) for w in (wo, wi))
+        one, other = (interpolate(table, _place_of_masking(facets, w)) for w in (wo, wi))
         above = np.where(wi[2] > 0, facets.weight(wo, wi, m) * one * other, f4(0))
         for side, eta in enumerate((ior, 1 / ior)):
             index = np.full(1, eta, f4)
@@ -235,35 +304,25 @@ def loss(shape: Shape, ior: float) -> Loss:
             wi = refract(wo, m, seen, cos_refracted, index)
             below = np.where(wi[2] < 0, facets.weight(wo, wi, m), f4(0))
             kept = reflected * above + (f4(1) - reflected) * below
-            lost[side, k] = 1 - kept.reshape(COLUMNS, -1).mean(1, dtype=float)
+            lost[side, k] = 1 - kept.reshape(size.columns, -1).mean(1, dtype=float)
     lost = np.clip(lost, LEAST, 1)
-    means = _means(shape, lost, _place_of_refraction) * np.array([[1], [ior**2]])
-    denser = np.full(1, max(ior, 1 / ior), f4)
-    passed = 1 - float(mean_over_cosines(lambda mu: fresnel_dielectric(mu, denser)[0])[0])
-    return Loss(_fine(lost), means.astype(np.float32), passed, ior)
+    return lost, _means(facets, lost, _place_of_refraction) * np.array([1, ior**2])
 
 
-def _rows(shape: Shape) -> list[tuple[Facets, float, float, float]]:
-    """Return facets, α along and across, and cos² of an azimuth of each row of a table."""
-
-    def row(alpha: float, turn: float) -> tuple[Facets, float, float, float]:
-        across = None if shape.alpha_v is None else np.full(1, shape.alpha_v, f4)
-        facets = Facets(np.full(1, alpha, f4), across, None, shape.beckmann, shape.separable)
-        return facets, alpha, shape.alpha_v or alpha, turn
-
-    if shape.alpha is None:
-        return [row(float(alpha), 1.0) for alpha in alpha_of(np.linspace(0, 1, ROUGHNESSES))]
-    return [row(shape.alpha, float(turn)) for turn in ([1.0] if shape.alpha_v is None else TURNS)]
+def _facets(shape: Shape) -> Facets:
+    """Return the facets of constants."""
+    across = None if shape.alpha_v is None else np.full(1, shape.alpha_v, f4)
+    return Facets(np.full(1, shape.alpha, f4), across, None, shape.beckmann, shape.separable)
 
 
-def _visible(facets: Facets, turn: float, cos: Doubles, shape: Shape) -> tuple[Floats, Floats]:
-    """Return directions of a cos² of the azimuth and cosines, and microfacets they see, (3, COLUMNS·k)."""
+def _visible(facets: Facets, turn: float, cos: Doubles, count: int) -> tuple[Floats, Floats]:
+    """Return directions of a cos² of the azimuth and cosines (k,), and microfacets they see, (3, k·count)."""
     cos = np.clip(cos, 1e-4 * float(facets.alpha[0]), 1)
     sin = np.sqrt(1 - cos * cos)
-    k = np.arange(count := NORMALS_OF_ONE if shape.alpha and shape.alpha_v is None else NORMALS)
+    k = np.arange(count)
     u = np.stack([k * GOLDEN % 1, (k + 0.5) / count]).astype(f4)
     wo = np.stack([sin * np.sqrt(turn), sin * np.sqrt(1 - turn), cos]).astype(f4).repeat(count, 1)
-    return wo, facets.visible_normals(wo, np.tile(u, COLUMNS))
+    return wo, facets.visible_normals(wo, np.tile(u, cos.size))
 
 
 def _neighbors(x: Floats, size: int) -> list[tuple[Ints, Floats]]:
@@ -274,25 +333,23 @@ def _neighbors(x: Floats, size: int) -> list[tuple[Ints, Floats]]:
 
 
 def _fine(table: Doubles) -> Floats:
-    """Return a table (sides, rows, columns), with one row with so many columns that the nearest is enough."""
-    if table.shape[1] == 1:
+    """Return a table, if it has one row with so many columns that the nearest is enough."""
+    if table[0].size == COLUMNS:
         fine, known = np.linspace(0, 1, FINE), np.linspace(0, 1, COLUMNS)
-        table = np.stack([np.interp(fine, known, side[0])[None] for side in table])
+        rows = [np.interp(fine, known, side) for side in table.reshape(-1, COLUMNS)]
+        table = np.stack(rows).reshape(*table.shape[:-1], FINE)
     return table.astype(np.float32)
 
 
-def _means(shape: Shape, table: Doubles, place: Callable[[Facets, Floats], Place]) -> Doubles:
-    """Return the means of a table (sides, rows, COLUMNS) over cosines, (sides, r), by midpoints."""
-    turns = 1 if shape.alpha_v is None else AROUND
-    root, turned = ((np.arange(k) + f4(0.5)) / f4(k) for k in (MIDPOINTS, turns))
+def _means(facets: Facets, table: Doubles, place: Callable[[Facets, Floats], Place]) -> Doubles:
+    """Return the means of a table (sides, turns, columns) over cosines, (sides,), by midpoints."""
+    turns, midpoints = (1, MIDPOINTS) if facets.alpha_v is None else (AROUND, MIDPOINTS // 4)
+    root, turned = ((np.arange(k) + f4(0.5)) / f4(k) for k in (midpoints, turns))
     sin, cos = sin_cos_turns(turned * f4(0.25))
     mu = np.tile(root * root, turns)
     r = np.sqrt(f4(1) - mu * mu)
-    w = np.stack([r * cos.repeat(MIDPOINTS), r * sin.repeat(MIDPOINTS), mu])
+    w = np.stack([r * cos.repeat(midpoints), r * sin.repeat(midpoints), mu])
     weight = np.tile(4.0 * root**3, turns) / mu.size  # 2μ dμ
-    means = []
-    for k, (facets, *_) in enumerate(_rows(shape)[: len(table[0]) if shape.alpha is None else 1]):
-        part = table[:, k : k + 1] if shape.alpha is None else table
-        values = (interpolate(part, *place(facets, w), side) for side in range(len(table)))
-        means.append([(value * weight).sum() for value in values])
-    return np.array(means).T
+    return np.array(
+        [(interpolate(table, place(facets, w), side) * weight).sum() for side in range(len(table))]
+    )

@@ -109,10 +109,10 @@ class OpenPBRBsdf(JointBsdf):
         stretched = "specular_roughness_anisotropy" in used
         layers.tangent = Tangent(np.zeros(1, f4)) if stretched else None
         across = {"specular_roughness", "specular_roughness_anisotropy", "coat_roughness", "coat_weight"}
-        layers.shape = Shape(None, None, False, False)
+        layers.shape = Shape(None, None, False, False, stretched)
         if not textures & across:
             along, beside = (float(alpha_of(r)[0]) for r in self._roughness())
-            layers.shape = Shape(along, beside if stretched else None, False, False)
+            layers.shape = Shape(along, beside if stretched else None, False, False, stretched)
         again = self.multiscatter
         layers._metal_again = again and "base_metalness" in used
         layers._sheet_again = again and self.transmissive and self.thin

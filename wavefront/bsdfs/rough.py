@@ -72,22 +72,20 @@ class Microfacets(JointBsdf):
     def _set_shape(self) -> None:
         """Set the tangent, and what tables of lost light depend on."""
         self.tangent = None if self.roughness_v is None else Tangent(self.rotation)
-        both = [r for r in (self.roughness, self.roughness_v) if r is not None]
-        textures = any(isinstance(r, BaseTexture) for r in both)
-        known = both if self.multiscatter and not textures else []
-        alpha, alpha_v, *_ = (*(float(alpha_of(r)[0]) for r in known), None, None)
-        self.shape = Shape(alpha, alpha_v, self.distribution == "beckmann", self.shadowing == "separable")
+        known = [
+            None
+            if r is None or isinstance(r, BaseTexture) or not self.multiscatter
+            else float(alpha_of(r)[0])
+            for r in (self.roughness, self.roughness_v)
+        ]
+        beckmann, separable = self.distribution == "beckmann", self.shadowing == "separable"
+        self.shape = Shape(
+            *known, beckmann, separable, bool(self.multiscatter and self.roughness_v is not None)
+        )
 
     def mean_roughness(self) -> Floats:
         """Return a roughness whose lobe has about the albedo of this one, with Fresnel's equations."""
         return self.roughness if self.roughness_v is None else np.sqrt(self.roughness * self.roughness_v)
-
-    def masking_roughness(self) -> Floats:
-        """Return a roughness that masks about as much as both: that of the root mean square of α."""
-        if self.roughness_v is None:
-            return self.roughness
-        along, across = self.roughness * self.roughness, self.roughness_v * self.roughness_v
-        return np.sqrt(np.sqrt(f4(0.5) * (along * along + across * across)))
 
     def facets(self) -> Facets:
         """Return the microfacets; unbound, their tangent is the x axis."""
