@@ -250,11 +250,11 @@ def _at_roughnesses(table: Doubles, axis: int) -> Doubles:
 @cache
 def _scaling_of_pair(shape: Shape) -> tuple[Doubles, Doubles]:
     """Return c (1, turns, columns) and mean albedo (1,) of constants."""
-    if shape.brushed and shape.alpha < shape.alpha_v:
-        factor, albedo = _scaling_of_pair(shape._replace(alpha=shape.alpha_v, alpha_v=shape.alpha))
+    alpha, across = _constants(shape)
+    if alpha < across:
+        factor, albedo = _scaling_of_pair(shape._replace(alpha=across, alpha_v=alpha))
         return factor[:, ::-1], albedo
     x, facets = np.linspace(0, 1, COLUMNS), _facets(shape)
-    alpha, across = shape.alpha, shape.alpha_v or shape.alpha
     kernels, turns = [], np.linspace(0, 1, TURNS) if shape.brushed else np.ones(1)
     for turn in turns:
         turned = turn * across**2 / (turn * across**2 + (1 - turn) * alpha**2)
@@ -283,12 +283,12 @@ def _scaling_of_pair(shape: Shape) -> tuple[Doubles, Doubles]:
 @cache
 def _loss_of_pair(shape: Shape, ior: float, size: Size) -> tuple[Doubles, Doubles]:
     """Return L (2, turns, columns) and its means (2,), of constants."""
-    if shape.brushed and shape.alpha < shape.alpha_v:
-        lost, means = _loss_of_pair(shape._replace(alpha=shape.alpha_v, alpha_v=shape.alpha), ior, size)
+    alpha, across = _constants(shape)
+    if alpha < across:
+        lost, means = _loss_of_pair(shape._replace(alpha=across, alpha_v=alpha), ior, size)
         return lost[:, ::-1], means
     facets, (factor, _) = _facets(shape), _scaling_of_pair(shape)
-    table, alpha, across = factor.astype(f4), shape.alpha, shape.alpha_v or shape.alpha
-    cos, places = np.linspace(0, 1, 2048) ** 2, np.linspace(0, 1, size.columns)
+    table, cos, places = factor.astype(f4), np.linspace(0, 1, 2048) ** 2, np.linspace(0, 1, size.columns)
     turns = np.linspace(0, 1, size.turns) if shape.brushed else np.ones(1)
     lost = np.empty((2, turns.size, size.columns))
     for k, turn in enumerate(turns):
@@ -307,6 +307,12 @@ def _loss_of_pair(shape: Shape, ior: float, size: Size) -> tuple[Doubles, Double
             lost[side, k] = 1 - kept.reshape(size.columns, -1).mean(1, dtype=float)
     lost = np.clip(lost, LEAST, 1)
     return lost, _means(facets, lost, _place_of_refraction) * np.array([1, ior**2])
+
+
+def _constants(shape: Shape) -> tuple[float, float]:
+    """Return α along and across."""
+    assert shape.alpha is not None
+    return shape.alpha, shape.alpha if shape.alpha_v is None else shape.alpha_v
 
 
 def _facets(shape: Shape) -> Facets:

@@ -79,9 +79,8 @@ class Microfacets(JointBsdf):
             for r in (self.roughness, self.roughness_v)
         ]
         beckmann, separable = self.distribution == "beckmann", self.shadowing == "separable"
-        self.shape = Shape(
-            *known, beckmann, separable, bool(self.multiscatter and self.roughness_v is not None)
-        )
+        brushed = self.multiscatter and self.roughness_v is not None
+        self.shape = Shape(known[0], known[1], beckmann, separable, brushed)
 
     def mean_roughness(self) -> Floats:
         """Return a roughness whose lobe has about the albedo of this one, with Fresnel's equations."""
