@@ -33,7 +33,7 @@ if TYPE_CHECKING:
 COLUMNS = 32  # of a table, by the angle to the normal
 FINE = 1024  # of a table of one row, in the end
 # roughnesses of tables for textures, where polynomials of them are stable (Chebyshev), and in the end
-NODES = 0.5 - 0.5 * np.cos(np.pi * (np.arange(7) + 0.5) / 7)
+NODES = 0.5 - 0.5 * sin_cos_turns((np.arange(7) + 0.5) / 14)[1]
 ROUGHNESSES = np.linspace(0, 1, 25)
 TURNS = 6  # rows of a table of two roughnesses: cos² of azimuths in [0, 1]
 GOLDEN = 0.6180339887498949  # (√5 − 1)/2, whose multiples are spread evenly
