@@ -33,7 +33,6 @@ ALLOWED = {
     "image/image.py": 1,
     "sampling/warp.py": 4,
     "session/diagnosis.py": 4,
-    "shapes/distance_grid.py": 2,
     "shapes/height_field.py": 1,
     "statistics/significance.py": 1,
     "statistics/student_t.py": 7,

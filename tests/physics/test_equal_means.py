@@ -172,7 +172,7 @@ def test_pictures_by_default(name: str) -> None:
     [
         pytest.param("furnace of 0.5, 8 bounces", "shared", marks=pytest.mark.slow),
         ("point light in a sphere", "shared"),
-        ("half-hidden rectangle", "branches 4"),
+        ("half-hidden rectangle", "branches 1, branches 4"),
         pytest.param("point light, offset 1.5", "branches 1", marks=pytest.mark.slow),
     ],
 )

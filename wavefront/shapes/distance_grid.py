@@ -88,7 +88,7 @@ class SignedDistanceGrid(CurvedShape):
     Examples
     --------
     >>> z, y, x = np.mgrid[-1:1:24j, -1:1:24j, -1:1:24j]
-    >>> ring = np.hypot(np.hypot(x, z) - 0.6, y) - 0.25
+    >>> ring = np.sqrt((np.sqrt(x**2 + z**2) - 0.6) ** 2 + y**2) - 0.25
     >>> torus = wf.SignedDistanceGrid(ring, [(-1, -1, -1), (1, 1, 1)], material="copper")
     >>> wf.render(torus, spp=1, size=(16, 16), lighting="cloudy").shape
     (16, 16, 3)
