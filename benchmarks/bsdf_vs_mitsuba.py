@@ -34,7 +34,7 @@ from wavefront.bsdfs import (
     ThinDisney,
 )
 from wavefront.bsdfs.microfacet import Facets, alpha_of
-from wavefront.bsdfs.plastic import inner_reflectance
+from wavefront.bsdfs.plastic import part_escaping
 
 LIMIT = 1e-4
 OF_TABLES = 1e-3  # of Mitsuba's rough plastic, whose tables sum over 32² normals
@@ -80,7 +80,7 @@ def separable(wo: Array, wi: Array, roughness: float) -> Array:
 
 
 def fitted_reflectance(ior: float) -> float:
-    """Mitsuba's fit of `inner_reflectance` (W. Egan and T. Hilgeman 1973)."""
+    """Mitsuba's fit of 1 − `part_escaping` (W. Egan and T. Hilgeman 1973)."""
     eta = 1 / ior
     return -1.4399 * eta**2 + 0.7099 * eta + 0.6681 + 0.0636 / eta
 
@@ -180,7 +180,8 @@ def compare(pairs: int = 10_000) -> list[Row]:
     for nonlinear in (False, True):
         plastic = {**glass, "diffuse_reflectance": color, "nonlinear": nonlinear}
         gray = {**plastic, "diffuse_reflectance": {"type": "rgb", "value": 0.6}}
-        times = (1 - 0.6**nonlinear * inner_reflectance(1.5)) / (1 - 0.6**nonlinear * fitted_reflectance(1.5))
+        inside = 1 - part_escaping(1.5)
+        times = (1 - 0.6**nonlinear * inside) / (1 - 0.6**nonlinear * fitted_reflectance(1.5))
         ours = Plastic(0.6, nonlinear=nonlinear)
         rows += rough(mi, f"plastic {nonlinear:d}", ours, {"type": "plastic", **gray}, pairs, times=times)
         for distribution in ("ggx", "beckmann"):

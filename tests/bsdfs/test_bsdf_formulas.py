@@ -28,7 +28,7 @@ from wavefront.bsdfs.microfacet import (
     reflect,
     refract,
 )
-from wavefront.bsdfs.plastic import boundary_tables, inner_reflectance
+from wavefront.bsdfs.plastic import boundary_tables, part_escaping
 from wavefront.bsdfs.rough import Tangent
 from wavefront.bsdfs.sheen import fiber_density, sheen_albedo, sheen_lobe
 
@@ -274,12 +274,42 @@ def test_the_tangent_follows_the_coordinates_and_turns_towards_v():
         assert back == pytest.approx(np.repeat(np.reshape(expected, (3, 1)), 2, 1), abs=1e-6)
 
 
-def test_inner_reflectance():
-    """The reflectance of diffuse light inside by quadrature there, where all is reflected beyond an angle."""
-    for ior in (1.3, 1.5, 2.2, 0.8):
-        mu, width = midpoints(200_000)
-        inside = (2 * mu * fresnel(mu, 1 / ior)).sum() * width
-        assert inner_reflectance(ior) == pytest.approx(inside, abs=2e-5)
+@pytest.mark.parametrize("ior", [1.3, 1.5, 2.2, 0.8, 0.1])
+def test_what_escapes_a_smooth_boundary(ior):
+    """By quadrature of the reflectance of diffuse light inside, where all is reflected beyond an angle."""
+    mu, width = midpoints(200_000)
+    escaping = (2 * mu * (1 - fresnel(mu, 1 / ior))).sum() * width
+    assert part_escaping(ior) == pytest.approx(escaping, abs=2e-5)
+
+
+@pytest.mark.parametrize("roughness", [0.1, 0.5, 1.0])
+@pytest.mark.parametrize("ior", [0.05, 0.5, 0.9, 1.5])
+def test_what_escapes_a_rough_boundary(ior, roughness):
+    """All that the rarer side does not reflect."""
+    _, _, escaping = boundary_tables(ior, roughness, False, False, True)
+    from_inside = Dielectric(1 / ior, roughness, multiscatter=False)
+    if ior < 1:
+        rng = np.random.default_rng(0)
+        u = rng.random((3, 100_000), dtype=F4)
+        mu = np.sqrt(rng.random(u.shape[1], dtype=F4))
+        wo = np.stack([np.sqrt(1 - mu * mu), 0 * mu, mu])
+        sample = from_inside.sample_f(wo, u)
+        reflected = np.where(sample.wi[2] > 0, sample.weight[0], 0).mean(dtype=float)
+        assert escaping[0] == pytest.approx(1 - reflected, abs=6e-3)
+    assert 0 < escaping[0] < 1
+
+
+@pytest.mark.parametrize("roughness", [0.0, 0.4])
+@pytest.mark.parametrize("ior", [1e-6, 1e-3, 1e3, 1e6])
+def test_plastic_of_any_index_is_finite_and_reflects_no_more_than_all(ior, roughness):
+    wo, wi = pairs()
+    for nonlinear in (False, True):
+        values = Plastic(1.0, roughness, ior, nonlinear=nonlinear).f(wo, wi)
+        gloss = Plastic(0.0, roughness, ior, nonlinear=nonlinear).f(wo, wi)
+        assert np.isfinite(values).all()
+        assert (values >= gloss).all()
+        red = Plastic(0.5, roughness, ior, nonlinear=nonlinear).f(wo, wi)
+        assert (red <= values).all()
 
 
 @pytest.mark.parametrize("nonlinear", [False, True])
@@ -287,7 +317,7 @@ def test_smooth_plastic(nonlinear):
     """Mitsuba 3's `plastic`: diffuse/(1 − diffuse·F inside)·(1 − Fo)(1 − Fi)/(π·η²)."""
     wo, wi = pairs()
     albedo = column(COLOR)
-    inside = inner_reflectance(1.4)
+    inside = 1 - part_escaping(1.4)
     base = albedo / (1 - (albedo * inside if nonlinear else inside))
     exact = base * (1 - fresnel(wo[2].astype(float), 1.4)) * (1 - fresnel(wi[2].astype(float), 1.4)) / 1.4**2
     ours = Plastic(COLOR, 0, 1.4, nonlinear=nonlinear, specular_reflectance=0.5)
@@ -300,7 +330,7 @@ def test_smooth_plastic(nonlinear):
 @pytest.mark.parametrize("distribution", ["ggx", "beckmann"])
 def test_boundary_of_rough_plastic(distribution):
     """What gets in, and what is reflected inside, are sums over samples of rough glass of that kind."""
-    from_outside, inside = boundary_tables(1.5, 0.5, distribution == "beckmann", False, False)
+    from_outside, _, escaping = boundary_tables(1.5, 0.5, distribution == "beckmann", False, False)
     for k in (10, 40, 63):
         mu = k / 63
         u = np.random.default_rng(0).random((3, 200_000), dtype=F4)
@@ -308,7 +338,7 @@ def test_boundary_of_rough_plastic(distribution):
         sample = Dielectric(1.5, 0.5, distribution=distribution, multiscatter=False).sample_f(wo, u)
         through = np.where(sample.wi[2] < 0, sample.weight[0] * sample.eta**2, 0)
         assert from_outside[0, k] == pytest.approx(through.mean(dtype=float), abs=4e-3)
-    assert 0.4 < inside[0] < inner_reflectance(1.5)
+    assert 0.4 < 1 - escaping[0] < 1 - part_escaping(1.5)
 
 
 def test_a_texture_of_roughness_finds_the_boundary_between_rows():

@@ -56,6 +56,9 @@ WHITE = {
     ),
     "glass by texture": lambda rng, r: Dielectric(1.5, Constant(r)),
     "plastic": lambda rng, r: Plastic(1.0, r, rng.uniform(1.05, 2.4), nonlinear=rng.random() < 0.5),
+    "plastic rarer than around": lambda rng, r: Plastic(
+        1.0, r, rng.uniform(0.2, 0.95), nonlinear=rng.random() < 0.5
+    ),
     "plastic of Beckmann": lambda rng, r: Plastic(1.0, r, distribution="beckmann"),
     "plastic with separable shadowing": lambda rng, r: Plastic(1.0, r, shadowing="separable"),
     "plastic by texture": lambda rng, r: Plastic(1.0, Constant(r)),

@@ -20,6 +20,7 @@ from .rough import Distribution, Microfacets, Shadowing, distribution_of, shadow
 
 COSINES = 64  # columns of a table: cosines in [0, 1]
 ROWS = 41  # rows of a table for textures: roughnesses in [0, 1]
+LEAST = 1e-30  # mean of what gets in, where a table has nothing
 
 
 @parametrized
@@ -85,18 +86,18 @@ class Plastic(Microfacets):
 
     def albedo(self, wo: Floats) -> Floats:
         """Return about the albedo of boundary and base."""
-        through, inside = self._boundary(wo[2])
-        base = self._base(inside) * ((f4(1) - inside) * through)
+        through, _, escaping = self._boundary(wo[2])
+        base = self._base(escaping) * through
         return base + self.specular_reflectance * (f4(1) - through)
 
     def evaluate(self, wo: Floats, wi: Floats) -> tuple[Floats, Floats]:
         """Return `f` and `pdf` of the base and, if it is rough, the boundary."""
         above = wi[2] > 0
-        through, inside = self._boundary(wo[2])
-        back, _ = self._boundary(np.maximum(wi[2], f4(0)))
+        through, mean, escaping = self._boundary(wo[2])
+        back, _, _ = self._boundary(np.maximum(wi[2], f4(0)))
         index = np.full(1, self.ior, f4)
-        scale = np.where(above, INV_PI / (index * index), f4(0))
-        f = self._base(inside) * (through * back * scale)
+        scale = np.where(above, INV_PI / mean, f4(0))
+        f = self._base(escaping) * (through * back * scale)
         chance = self._chance(through)
         pdf = cosine_hemisphere_pdf(wi) * (f4(1) - chance)
         if self._smooth:
@@ -107,7 +108,7 @@ class Plastic(Microfacets):
 
     def sample_f(self, wo: Floats, u: Floats) -> BsdfSample:
         """Reflect at the boundary, or scatter at the base, by u[2] and about what each reflects."""
-        through, _ = self._boundary(wo[2])
+        through, _, _ = self._boundary(wo[2])
         chance = self._chance(through)
         glossy = u[2] < chance
         wi = mirrored(wo) if self._smooth else reflect(wo, self.facets().visible_normals(wo, u))
@@ -120,10 +121,12 @@ class Plastic(Microfacets):
         weight = np.where(glossy, self.specular_reflectance * part, weight)
         return BsdfSample(wi, weight, np.where(glossy, chance, pdf), glossy)
 
-    def _base(self, inside: Floats) -> Floats:
-        """Albedo of the base with all reflections between it and the boundary, (3, n)."""
-        each = self.reflectance * inside if self.nonlinear else inside
-        return self.reflectance / (f4(1) - each)
+    def _base(self, escaping: Floats) -> Floats:
+        """Part of what gets in that gets out, after all reflections between base and boundary, (3, n)."""
+        if not self.nonlinear:
+            return self.reflectance
+        out = self.reflectance * escaping
+        return out / (f4(1) - self.reflectance + out)
 
     def _chance(self, through: Floats) -> Floats:
         """Probability of reflection at the boundary, (n,), as Mitsuba chooses it."""
@@ -132,24 +135,26 @@ class Plastic(Microfacets):
         total = gloss + base
         return gloss / np.where(total > 0, total, f4(1))
 
-    def _boundary(self, cos: Floats) -> tuple[Floats, Floats]:
-        """Part of light from outside that gets through, and of light inside that does not; (n,)."""
+    def _boundary(self, cos: Floats) -> tuple[Floats, Floats, Floats]:
+        """Part of light that gets in, of diffuse light that gets in, and that gets out again; (n,)."""
         if self._smooth:
             reflected, _ = fresnel_dielectric(cos, np.full(1, self.ior, f4))
-            return f4(1) - reflected, np.full(1, inner_reflectance(self.ior), f4)
+            escaping = part_escaping(self.ior)
+            return f4(1) - reflected, np.full(1, escaping * self.ior**2, f4), np.full(1, escaping, f4)
         shape = self.distribution == "beckmann", self.shadowing == "separable"
-        through, inside = boundary_tables(self.ior, self._one, *shape, self.multiscatter)
+        through, *parts = boundary_tables(self.ior, self._one, *shape, self.multiscatter)
         x = np.clip(cos, f4(0), f4(1)) * f4(COSINES - 1)
         i = np.minimum(x.astype(np.intp), COSINES - 2)
         x = x - i.astype(f4)
         if self._one is not None:
-            return through[0].take(i) * (f4(1) - x) + through[0].take(i + 1) * x, inside
+            return through[0].take(i) * (f4(1) - x) + through[0].take(i + 1) * x, *parts
         y = np.clip(self.roughness, f4(0), f4(1)) * f4(ROWS - 1)
         j = np.minimum(y.astype(np.intp), ROWS - 2)
         y, flat, corner = y - j.astype(f4), through.ravel(), j * COSINES + i
         low = flat.take(corner) * (f4(1) - x) + flat.take(corner + 1) * x
         high = flat.take(corner + COSINES) * (f4(1) - x) + flat.take(corner + COSINES + 1) * x
-        return low * (f4(1) - y) + high * y, inside.take(j) * (f4(1) - y) + inside.take(j + 1) * y
+        mean, escaping = (part.take(j) * (f4(1) - y) + part.take(j + 1) * y for part in parts)
+        return low * (f4(1) - y) + high * y, mean, escaping
 
 
 def _mean(color: Floats) -> Floats:
@@ -157,36 +162,40 @@ def _mean(color: Floats) -> Floats:
 
 
 @cache
-def inner_reflectance(ior: float) -> float:
-    """Part of diffuse light inside a smooth boundary that it reflects: 1 − (1 − F)/η², by F outside."""
+def part_escaping(ior: float) -> float:
+    """Part of diffuse light inside a smooth boundary that gets out: (1 − F)/η², by F from the rarer side."""
     mu = (np.arange(4096) + 0.5) / 4096
-    outside = (2 * mu * fresnel_dielectric(mu, np.full(1, ior))[0]).mean()
-    return float(1 - (1 - outside) / ior**2)
+    passed = 1 - (2 * mu * fresnel_dielectric(mu, np.full(1, max(ior, 1 / ior)))[0]).mean()
+    return float(passed / max(ior, 1) ** 2)
 
 
 @cache
 def boundary_tables(
     ior: float, roughness: float | None, beckmann: bool, separable: bool, multiscatter: bool
-) -> tuple[Floats, Floats]:
-    """Return what gets in through rough boundaries (r, COSINES), and what they reflect inside (r,).
+) -> tuple[Floats, Floats, Floats]:
+    """Return what gets in through rough boundaries (r, COSINES), its mean, and what gets out (r,).
 
-    Rows are one roughness, or `ROWS` from 0 to 1. With multiple scattering all gets in that is not reflected,
-    and the inner reflectance is what lets as much diffuse light out again. Without, as in Mitsuba 3's
-    `roughplastic`, a mean over diffuse light is that of the columns, 1.5 % less than the integral.
+    Rows are one roughness, or `ROWS` from 0 to 1. With multiple scattering all gets through that the rarer
+    side does not reflect. Without, as in Mitsuba 3's `roughplastic`, a mean over diffuse light is that of the
+    columns, 1.5 % less than the integral, and what gets in is what gets out times η².
     """
     cos, mu = np.linspace(0, 1, COSINES), (np.arange(4096) + 0.5) / 4096
     rows = np.linspace(0, 1, ROWS) if roughness is None else np.array([roughness])
-    through, inside = [], []
+    through, mean, escaping = [], [], []
     for row in rows:
         facets = Facets(alpha_of(np.full(1, row, f4)), None, None, beckmann, separable)
-        if multiscatter:
-            through.append(1 - _directional(facets, ior, refracted=False))
-            inside.append(1 - (2 * mu * np.interp(mu, cos, through[-1])).mean() / ior**2)
+        reflected = partial(_directional, facets, refracted=False)
+        if not multiscatter:
+            through.append(_directional(facets, ior, refracted=True))
+            escaping.append(1 - 2 * (cos * reflected(1 / ior)).mean())
+            mean.append(escaping[-1] * ior**2)
             continue
-        through.append(_directional(facets, ior, refracted=True))
-        reflected = _directional(facets, 1 / ior, refracted=False)
-        inside.append(2 * (cos * reflected).mean())
-    return np.array(through, np.float32), np.array(inside, np.float32)
+        through.append(np.maximum(1 - reflected(ior), 0))
+        rarer = through[-1] if ior >= 1 else 1 - reflected(1 / ior)
+        entering, passing = ((2 * mu * np.interp(mu, cos, part)).mean() for part in (through[-1], rarer))
+        mean.append(max(entering, LEAST))
+        escaping.append(passing / max(ior, 1) ** 2)
+    return np.array(through, np.float32), np.array(mean, np.float32), np.array(escaping, np.float32)
 
 
 def _directional(facets: Facets, eta: float, refracted: bool) -> Doubles:
