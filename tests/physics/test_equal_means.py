@@ -84,7 +84,7 @@ def plain(name: str) -> Mean:
 @techniques
 @pytest.mark.parametrize("name", PICTURES)
 def test_pictures(name: str, options: dict[str, Any]) -> None:
-    spp = SPP // options["branches"]
+    spp = SPP // options["branches"] * (2 if options["caustics"] else 1)  # paths from lights vary more
     if options["reuse"] or options["caustics"]:
         found = mean_of_runs(PICTURES[name](), spp, accel="auto", workers=None, **options)
     else:
