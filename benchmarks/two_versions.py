@@ -41,7 +41,8 @@ for line in sys.stdin:
         scene, given = subject if isinstance(subject, tuple) else (subject, {})
         spp = 1
     begin = time.process_time()
-    image = wf.render(scene, spp, seed=seed, workers=1, executor="threads", progress=False, **given)
+    how = {**given, "workers": 1, "executor": "threads", "progress": False}
+    image = wf.render(scene, spp, seed=seed, **how)
     seconds = time.process_time() - begin
     np.save(file, image.rgb)
     chosen = "shared" if image.metadata["reuse"] else str(image.metadata["branches"])

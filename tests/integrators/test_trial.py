@@ -218,7 +218,7 @@ def test_sharing_is_tried_where_nothing_stays_alone_or_light_is_rare(
     ],
     ids=str,
 )
-@pytest.mark.first(2)
+@pytest.mark.first(1)
 def test_paths_are_not_shared_with_some_settings(
     settings: dict[str, Any], monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -41,6 +41,7 @@ def test_double():
 """
 
 
+@pytest.mark.slow
 def test_only_a_test_that_fails_kills_a_mutant(tmp_path: Path) -> None:
     """A mutant that cannot be imported, or that leaves no tests to run, is invalid."""
     (tmp_path / "formulas.py").write_text(FORMULAS)
