@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..arrays.vec import Doubles
+from ..bsdfs import Diffuse
 from ..core.errors import number
 from ..core.parameter import Parameter
 from ..materials import Material, MaterialLike, as_material
@@ -172,6 +173,14 @@ class CurvedShape(Shape):
     """Base class of shapes whose primitives are not triangles: one `Sphere`, or many of one kind."""
 
     colors: Doubles | None = None  # (count, 4) linear colors, or None if all are white
+    _gray: Material | None = None  # the default material, once it was asked for
+
+    @property
+    def default_material(self) -> Material:
+        """A gray `Diffuse`."""
+        if self._gray is None:
+            self._gray = Material(Diffuse(0.5))
+        return self._gray
 
     @property
     @abstractmethod

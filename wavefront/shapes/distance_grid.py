@@ -10,10 +10,9 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ..arrays.vec import FLOAT32_MAX, Doubles, Floats, Ints, f4, length
-from ..bsdfs import Diffuse
 from ..core.errors import SceneError, finite_array
 from ..core.suggestions import suggests_keywords
-from ..materials import Material, MaterialLike
+from ..materials import MaterialLike
 from ..media.grid import grid_transform
 from .base import Checked, CurvedShape
 from .mesh import positions
@@ -96,7 +95,6 @@ class SignedDistanceGrid(CurvedShape):
 
     values = Checked(_values)
     transform = Checked(_placed)
-    _default: Material | None = None
     _found: tuple[Floats, Ints] | None = None  # values, and their `cells`
 
     @suggests_keywords
@@ -118,13 +116,6 @@ class SignedDistanceGrid(CurvedShape):
     def __repr__(self) -> str:
         """Return the name and the number of values along each axis."""
         return f"<SignedDistanceGrid {self.name!r}: {' × '.join(map(str, self.values.shape))}>"
-
-    @property
-    def default_material(self) -> Material:
-        """A gray `Diffuse`."""
-        if self._default is None:
-            self._default = Material(Diffuse(0.5))
-        return self._default
 
     @property
     def emission(self) -> Any:

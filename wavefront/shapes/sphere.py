@@ -9,10 +9,9 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..arrays.vec import FLOAT32_MAX, Doubles
-from ..bsdfs import Diffuse
 from ..core.errors import SceneError, finite_array, number, rotation_matrix
 from ..core.suggestions import suggests_keywords
-from ..materials import Material, MaterialLike
+from ..materials import MaterialLike
 from ..textures.parameter import Color
 from .base import Checked
 from .mesh import FLOAT32_MIN
@@ -88,19 +87,11 @@ class Sphere(SphereEmission):
         self.radius = radius
         self.transform = transform
         self.material = material
-        self._default: Material | None = None
         self.emission = emission
 
     def __repr__(self) -> str:
         """Return the name, center and radius of the sphere."""
         return f"<Sphere {self.name!r}: center {self.center.tolist()}, radius {self.radius:g}>"
-
-    @property
-    def default_material(self) -> Material:
-        """A gray `Diffuse`."""
-        if self._default is None:
-            self._default = Material(Diffuse(0.5))
-        return self._default
 
     @property
     def count(self) -> int:
