@@ -25,11 +25,17 @@ def rows() -> list[list[wf.Bsdf]]:
 
 
 def diffuse() -> list[wf.Bsdf]:
-    """Return `Diffuse`, one of them on the front alone, and clay ever rougher, without and with energy."""
+    """Return `Diffuse`, paper that lets light through, and clay ever rougher, without and with energy."""
     sigmas = (0.3, 0.6, 1.0)
     rough = [wf.OrenNayar(CLAY, sigma) for sigma in sigmas]
     preserving = [wf.OrenNayar(CLAY, sigma, energy_preserving=True) for sigma in sigmas]
-    return [wf.Diffuse(0.8), wf.Diffuse(SKY), wf.Sides(wf.Diffuse(CLAY)), *rough, *preserving]
+    return [
+        wf.Diffuse(SKY),
+        wf.DiffuseTransmission((0.5, 0.45, 0.35), (0.4, 0.33, 0.2)),
+        wf.Sides(wf.Diffuse(CLAY)),
+        *rough,
+        *preserving,
+    ]
 
 
 def metal() -> list[wf.Bsdf]:
