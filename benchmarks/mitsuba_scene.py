@@ -12,52 +12,54 @@ import wavefront as wf
 FAR = 1e5  # distance of a sun, in units of the scene
 
 
-def to_mitsuba(
-    mi: Any,
-    scene: wf.Scene,
-    max_bounces: int,
-    sampler: str = "independent",
-    spp: int = 16,
-    *,
-    guides: bool = False,
-) -> Any:
+def to_mitsuba(mi: Any, scene: wf.Scene, max_bounces: int, *, guides: bool = False) -> Any:
     """Return the scene as Mitsuba loads it; materials and lights that have no twin raise ValueError.
 
-    With `guides` its pictures have albedo and normal, too, as channels 3 to 8.
+    With `guides` its pictures have albedo and normal, too, as channels 3 to 8. One copy of a scene serves
+    all samplers, by `sensor`: the time of Mitsuba's kernels grows with the lights of all scenes of a process.
 
     Flat meshes that look and shine alike become one: Mitsuba compiles code for each, so that a
     thousand small lights would take ten times as long, with no less noise.
     """
-    camera = scene.camera or scene.framing_camera()
     paths = {"type": "path", "max_depth": max_bounces + 1}
     layers = {"type": "aov", "aovs": "albedo:albedo,normal:sh_normal", "paths": paths}
     description: dict[str, Any] = {
         "type": "scene",
         "integrator": layers if guides else paths,
-        "sensor": {
-            "type": "perspective",
-            "fov": camera.fov,
-            "fov_axis": "y",
-            "to_world": mi.ScalarTransform4f().look_at(
-                origin=camera.origin.tolist(),
-                target=(camera.origin - camera.rotation[:, 2]).tolist(),
-                up=camera.rotation[:, 1].tolist(),
-            ),
-            "film": {
-                "type": "hdrfilm",
-                "width": camera.size[0],
-                "height": camera.size[1],
-                "rfilter": {"type": "box"},
-                "pixel_format": "rgb",
-            },
-            "sampler": {"type": sampler, "sample_count": spp},
-        },
+        "sensor": _sensor(mi, scene, "independent", 16),
     }
     for i, shape in enumerate(_joined(scene.shapes)):
         description[f"shape{i}"] = _sphere(shape) if isinstance(shape, wf.Sphere) else _mesh(mi, shape, i)
     for i, light in enumerate(scene.lights):
         description[f"light{i}"] = _light(mi, light)
     return mi.load_dict(description)
+
+
+def sensor(mi: Any, scene: wf.Scene, sampler: str, spp: int) -> Any:
+    """Return the camera of a scene as Mitsuba loads it, with a sampler."""
+    return mi.load_dict(_sensor(mi, scene, sampler, spp))
+
+
+def _sensor(mi: Any, scene: wf.Scene, sampler: str, spp: int) -> dict[str, Any]:
+    camera = scene.camera or scene.framing_camera()
+    return {
+        "type": "perspective",
+        "fov": camera.fov,
+        "fov_axis": "y",
+        "to_world": mi.ScalarTransform4f().look_at(
+            origin=camera.origin.tolist(),
+            target=(camera.origin - camera.rotation[:, 2]).tolist(),
+            up=camera.rotation[:, 1].tolist(),
+        ),
+        "film": {
+            "type": "hdrfilm",
+            "width": camera.size[0],
+            "height": camera.size[1],
+            "rfilter": {"type": "box"},
+            "pixel_format": "rgb",
+        },
+        "sampler": {"type": sampler, "sample_count": spp},
+    }
 
 
 def _joined(shapes: list[Any]) -> list[Any]:

@@ -8,10 +8,11 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from typing import Any
+from weakref import WeakKeyDictionary
 
 import numpy as np
 from cycles_peer import Cycles
-from mitsuba_scene import to_mitsuba
+from mitsuba_scene import sensor, to_mitsuba
 
 import wavefront as wf
 
@@ -34,6 +35,7 @@ METHODS: dict[str, dict[str, Any]] = {  # settings of `wf.render` by what a side
 }
 CYCLES = {"plain": {}, DENOISED: {"denoise": True}, GUIDED: {"guide": True}}
 Render = Callable[[int, int], np.ndarray]  # spp, seed -> picture
+_COPIES: WeakKeyDictionary[wf.Scene, dict[tuple[str, int], Any]] = WeakKeyDictionary()
 
 
 def renderer(
@@ -57,18 +59,28 @@ def ours(scene: wf.Scene, max_bounces: int, method: str, accel: str) -> Render:
 
 
 def mitsuba(scene: wf.Scene, max_bounces: int, sampler: str, variant: str, counts: tuple[int, ...]) -> Render:
-    """Return a renderer of Mitsuba, with the scene loaded for each of some sample counts."""
+    """Return a renderer of Mitsuba, with a sensor for each of some sample counts."""
     import mitsuba as mi
 
     mi.set_variant(variant)
-    loaded = {spp: to_mitsuba(mi, scene, max_bounces, sampler, spp) for spp in counts}
+    loaded = loaded_by_mitsuba(mi, scene, max_bounces)
+    sensors = {spp: sensor(mi, scene, sampler, spp) for spp in counts}
 
     def render(spp: int, seed: int) -> np.ndarray:
         mi.set_variant(variant)
-        subject = loaded.get(spp, loaded[counts[-1]])
-        return np.array(mi.render(subject, spp=spp, seed=seed))
+        at = sensors.get(spp, sensors[counts[-1]])
+        return np.array(mi.render(loaded, sensor=at, spp=spp, seed=seed))
 
     return render
+
+
+def loaded_by_mitsuba(mi: Any, scene: wf.Scene, max_bounces: int) -> Any:
+    """Return a scene as the variant of Mitsuba in use loads it, one copy for all samplers that draw it."""
+    key = mi.variant(), max_bounces
+    copies = _COPIES.setdefault(scene, {})
+    if key not in copies:
+        copies[key] = to_mitsuba(mi, scene, max_bounces)
+    return copies[key]
 
 
 def cycles(scene: wf.Scene, max_bounces: int, method: str, python: str, counts: tuple[int, ...]) -> Render:
