@@ -6,10 +6,10 @@
 Each mutant is one change of one file. It is made in a process of its own, which is forked where all is
 imported already, so that a mutant costs no more than the tests that it fails:
 
-- `constants`: a number times 1.1, or plus 1 if it is an integer; 0 becomes 1 and, in a name or a test of
-  equality, stays. Indices, shapes, texts and types are no formulas and are left out.
+- `constants`: a number times 1.1 (`--by` another factor), or plus 1 if it is an integer; 0 becomes 1 and, in
+  a name or a test of equality, stays. Indices, shapes, texts and types are no formulas and are left out.
 - `factors`: a product or a quotient without one of its factors, `a *= b` or `a /= b` left out, `-a` as a.
-- `densities`: what a function named pdf or pmf returns, or what is assigned to such a name, times 1.1; and
+- `densities`: what a function named pdf or pmf returns, or what is assigned to such a name, times that; and
   all of these in one class at once, so that what is returned with a sample agrees with the function.
 
 The tests of a file stand in `TESTS`; they run with -x, and `--tests` names others. A test that fails kills a
@@ -65,6 +65,13 @@ TESTS: dict[str, tuple[str, ...]] = {
         "tests/integrators/test_clamp.py",
         "tests/aovs/test_sampled_layers.py",
         "tests/denoising/test_denoising.py",
+    ),
+    "wavefront/bsdfs/plastic.py": (
+        "tests/bsdfs/test_bsdf_formulas.py",
+        "tests/bsdfs/test_energy.py",
+        "tests/bsdfs/test_bsdfs.py",
+        "tests/bsdfs/test_bsdf_models.py",
+        "tests/properties/test_density_of_bsdfs.py",
     ),
     **dict.fromkeys(
         ("wavefront/bsdfs/disney.py", "wavefront/bsdfs/disney_thin.py"),
@@ -149,8 +156,8 @@ class Mutant:
 class Finder(ast.NodeVisitor):
     """Collects the mutants of a file."""
 
-    def __init__(self, file: str, source: str, kinds: set[str]) -> None:
-        self.file, self.kinds = file, kinds
+    def __init__(self, file: str, source: str, kinds: set[str], by: float) -> None:
+        self.file, self.kinds, self.by = file, kinds, by
         self.lines = source.encode().splitlines(keepends=True)
         self.begins = [0]
         for line in self.lines:
@@ -163,6 +170,9 @@ class Finder(ast.NodeVisitor):
         start = self.begins[node.lineno - 1] + node.col_offset  # type: ignore[attr-defined]
         end = self.begins[node.end_lineno - 1] + node.end_col_offset  # type: ignore[attr-defined]
         self.found.append(Mutant(self.file, node.lineno, ((start, end, new),), what))  # type: ignore[attr-defined]
+
+    def scale(self, node: ast.AST, what: str) -> None:
+        self.add(node, f"(({self.text(node)}) * np.float32({self.by}))", f"{what} x {self.by}")
 
     def text(self, node: ast.AST) -> str:
         return ast.get_source_segment(self.data.decode(), node) or ""
@@ -181,7 +191,9 @@ class Finder(ast.NodeVisitor):
         parts = [each for each in self.found[before:] if "()" in each.what or "sample" in each.what]
         if "densities" in self.kinds and len(parts) > 1:
             edits = tuple(edit for part in parts for edit in part.edits)
-            self.found.append(Mutant(self.file, node.lineno, edits, f"all densities of {node.name} x 1.1"))
+            self.found.append(
+                Mutant(self.file, node.lineno, edits, f"all densities of {node.name} x {self.by}")
+            )
 
     def visit_AnnAssign(self, node: ast.AnnAssign) -> None:
         if node.value is not None:
@@ -220,7 +232,7 @@ class Finder(ast.NodeVisitor):
         value = node.value
         if "constants" not in self.kinds or isinstance(value, bool) or not isinstance(value, int | float):
             return
-        new = repr(value + 1) if isinstance(value, int) else repr(value * 1.1) if value else "1.0"
+        new = repr(value + 1) if isinstance(value, int) else repr(value * self.by) if value else "1.0"
         self.add(node, f"({new})", f"{self.text(node)} -> {new}")
 
     def visit_BinOp(self, node: ast.BinOp) -> None:
@@ -254,20 +266,16 @@ class Finder(ast.NodeVisitor):
         name = self.text(target)
         if "densities" in self.kinds and not isinstance(target, ast.Tuple) and _is_density(name):
             inside = self.functions[-1] if self.functions else "class"
-            self.add(
-                node.value, f"(({self.text(node.value)}) * np.float32(1.1))", f"{name} in {inside} x 1.1"
-            )
+            self.scale(node.value, f"{name} in {inside}")
         self.visit(node.value)
 
     def visit_Return(self, node: ast.Return) -> None:
         value, name = node.value, self.functions[-1] if self.functions else ""
         if "densities" in self.kinds and value is not None:
             if _is_density(name) and not isinstance(value, ast.Tuple):
-                text = self.text(value)
-                self.add(value, f"(({text}) * np.float32(1.1))", f"{name}() x 1.1")
+                self.scale(value, f"{name}()")
             elif name == "evaluate" and isinstance(value, ast.Tuple):
-                text = self.text(value.elts[1])
-                self.add(value.elts[1], f"(({text}) * np.float32(1.1))", "pdf of evaluate() x 1.1")
+                self.scale(value.elts[1], "pdf of evaluate()")
         if value is not None:
             self.visit(value)
 
@@ -281,10 +289,10 @@ def _short(text: str) -> str:
     return text if len(text) < 60 else text[:40] + " … " + text[-16:]
 
 
-def mutants_of(file: str, kinds: set[str]) -> Iterator[Mutant]:
+def mutants_of(file: str, kinds: set[str], by: float) -> Iterator[Mutant]:
     """Yield the mutants of a file, those of one place side by side."""
     source = (ROOT / file).read_text()
-    finder = Finder(file, source, kinds)
+    finder = Finder(file, source, kinds, by)
     finder.visit(ast.parse(source))
     for mutant in sorted(finder.found, key=lambda each: each.edits):
         try:
@@ -415,6 +423,7 @@ def main() -> int:
     parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
     parser.add_argument("files", nargs="*", help="of the package; by default those of TESTS")
     parser.add_argument("--kinds", default="constants,factors")
+    parser.add_argument("--by", type=float, default=1.1, help="factor of constants and densities")
     parser.add_argument("--tests", nargs="+", help="in place of those of each file")
     parser.add_argument("--jobs", type=int, default=os.cpu_count() or 1)
     parser.add_argument("--limit", type=float, default=180.0, help="seconds for one mutant")
@@ -427,7 +436,7 @@ def main() -> int:
     kinds = set(given.kinds.split(","))
     files = given.files or (DENSITIES if kinds == {"densities"} else FORMULAS)
     first, step = (int(each) for each in given.part.split("/"))
-    mutants = [mutant for file in files for mutant in mutants_of(file, kinds)]
+    mutants = [mutant for file in files for mutant in mutants_of(file, kinds, given.by)]
     mutants = [mutant for mutant in mutants if mutant.line >= given.from_line][first::step]
     if given.list:
         for mutant in mutants:
