@@ -6,6 +6,7 @@ The references read as their sources do, angles and all; the package's forms avo
 import numpy as np
 import pytest
 from scipy import special
+from scipy.stats import qmc
 
 from wavefront.arrays.state import SurfaceInteraction
 from wavefront.bsdfs import (
@@ -339,6 +340,36 @@ def test_boundary_of_rough_plastic(distribution):
         through = np.where(sample.wi[2] < 0, sample.weight[0] * sample.eta**2, 0)
         assert from_outside[0, k] == pytest.approx(through.mean(dtype=float), abs=4e-3)
     assert 0.4 < 1 - escaping[0] < 1 - part_escaping(1.5)
+
+
+@pytest.mark.parametrize("roughness", [0.2, 0.6])
+def test_gloss_of_rough_plastic(roughness):
+    """A rough mirror times Fresnel's equations and the tint."""
+    wo, wi = pairs()
+    value, cos = reflection(wo, wi, roughness**2)
+    exact = column(COLOR) * value * fresnel(cos, 1.4)
+    gloss = Plastic(0, roughness, 1.4, specular_reflectance=COLOR)
+    assert gloss.f(wo, wi) == pytest.approx(exact, rel=1e-3, abs=1e-6)
+
+
+@pytest.mark.parametrize("nonlinear", [False, True])
+@pytest.mark.parametrize("roughness", [0.0, 0.4])
+def test_albedo_of_plastic(roughness, nonlinear):
+    """The mean weight of its samples, with colors and tints that differ by channel."""
+    plastic = Plastic(COLOR, roughness, 1.6, specular_reflectance=(0.3, 0.6, 1.0), nonlinear=nonlinear)
+    points = qmc.Sobol(3, seed=0).random_base2(16).T.astype(F4)
+    for mu in (0.9, 0.5, 0.2):
+        wo = column([np.sqrt(1 - mu * mu), 0, mu]).astype(F4)
+        weights = plastic.sample_f(np.repeat(wo, points.shape[1], 1), points).weight
+        assert plastic.albedo(wo)[:, 0] == pytest.approx(weights.mean(1, dtype=float), rel=2e-3)
+
+
+def test_plastic_by_default():
+    """A gray base below a smooth boundary of index 1.5."""
+    wo, wi = pairs()
+    plastic = Plastic()
+    assert np.array_equal(plastic.f(wo, wi), Plastic(0.5, 0.0, 1.5, specular_reflectance=1.0).f(wo, wi))
+    assert plastic.dimensions == 3
 
 
 def test_a_texture_of_roughness_finds_the_boundary_between_rows():
