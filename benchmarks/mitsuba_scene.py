@@ -63,11 +63,12 @@ def _sensor(mi: Any, scene: wf.Scene, sampler: str, spp: int) -> dict[str, Any]:
 
 
 def _joined(shapes: list[Any]) -> list[Any]:
-    """Join meshes without normals of their own that have the same material and emission."""
+    """Join meshes without normals of their own and textures that have the same material and emission."""
     groups: dict[Any, list[wf.Mesh]] = {}
     for i, shape in enumerate(shapes):
-        flat = isinstance(shape, wf.Mesh) and shape.normals is None and shape.uvs is None
-        look = (repr(_bsdf(shape.material.bsdf)), repr(shape.emission)) if flat else i
+        material = repr(_bsdf(shape.material.bsdf))
+        plain = isinstance(shape, wf.Mesh) and shape.normals is None and "bitmap" not in material
+        look = (material, repr(shape.emission)) if plain else i
         groups.setdefault(look, []).append(shape)
     return [meshes[0] if len(meshes) == 1 else _union(meshes) for meshes in groups.values()]
 
