@@ -286,18 +286,16 @@ def test_what_escapes_a_smooth_boundary(ior):
 @pytest.mark.parametrize("roughness", [0.1, 0.5, 1.0])
 @pytest.mark.parametrize("ior", [0.05, 0.5, 0.9, 1.5])
 def test_what_escapes_a_rough_boundary(ior, roughness):
-    """All that the rarer side does not reflect."""
+    """All that the rarer side does not reflect, over η² from the denser side."""
     _, _, escaping = boundary_tables(ior, roughness, False, False, True)
-    from_inside = Dielectric(1 / ior, roughness, multiscatter=False)
-    if ior < 1:
-        rng = np.random.default_rng(0)
-        u = rng.random((3, 100_000), dtype=F4)
-        mu = np.sqrt(rng.random(u.shape[1], dtype=F4))
-        wo = np.stack([np.sqrt(1 - mu * mu), 0 * mu, mu])
-        sample = from_inside.sample_f(wo, u)
-        reflected = np.where(sample.wi[2] > 0, sample.weight[0], 0).mean(dtype=float)
-        assert escaping[0] == pytest.approx(1 - reflected, abs=6e-3)
-    assert 0 < escaping[0] < 1
+    from_rarer = Dielectric(max(ior, 1 / ior), roughness, multiscatter=False)
+    rng = np.random.default_rng(0)
+    u = rng.random((3, 100_000), dtype=F4)
+    mu = np.sqrt(rng.random(u.shape[1], dtype=F4))
+    wo = np.stack([np.sqrt(1 - mu * mu), 0 * mu, mu])
+    sample = from_rarer.sample_f(wo, u)
+    reflected = np.where(sample.wi[2] > 0, sample.weight[0], 0).mean(dtype=float)
+    assert escaping[0] == pytest.approx((1 - reflected) / max(ior, 1) ** 2, abs=6e-3)
 
 
 @pytest.mark.parametrize("roughness", [0.0, 0.4])
@@ -321,10 +319,10 @@ def test_smooth_plastic(nonlinear):
     inside = 1 - part_escaping(1.4)
     base = albedo / (1 - (albedo * inside if nonlinear else inside))
     exact = base * (1 - fresnel(wo[2].astype(float), 1.4)) * (1 - fresnel(wi[2].astype(float), 1.4)) / 1.4**2
-    ours = Plastic(COLOR, 0, 1.4, nonlinear=nonlinear, specular_reflectance=0.5)
+    ours = Plastic(COLOR, 0, 1.4, nonlinear=nonlinear, specular_reflectance=0.8)
     assert ours.f(wo, wi) == pytest.approx(exact / np.pi, rel=1e-4)
     seen = 1 - fresnel(wo[2].astype(float), 1.4)
-    gloss, matte = 0.5 * (1 - seen), np.mean(COLOR) * seen
+    gloss, matte = 0.8 * (1 - seen), np.mean(COLOR) * seen
     assert ours.pdf(wo, wi) == pytest.approx(matte / (gloss + matte) * wi[2] / np.pi, rel=1e-4)
 
 
@@ -340,6 +338,33 @@ def test_boundary_of_rough_plastic(distribution):
         through = np.where(sample.wi[2] < 0, sample.weight[0] * sample.eta**2, 0)
         assert from_outside[0, k] == pytest.approx(through.mean(dtype=float), abs=4e-3)
     assert 0.4 < 1 - escaping[0] < 1 - part_escaping(1.5)
+
+
+@pytest.mark.parametrize("nonlinear", [False, True])
+def test_base_of_rough_plastic_that_scatters_once(nonlinear):
+    """Mitsuba 3's `roughplastic`: diffuse/(1 − diffuse·r)·T(wo)·T(wi)/(π·η²) with r reflected inside."""
+    wo, wi = pairs()
+    options = {"nonlinear": nonlinear, "multiscatter": False}
+    through, _, escaping = boundary_tables(1.4, 0.5, False, False, False)
+    cosines = np.linspace(0, 1, through.shape[1])
+    seen, lit = (np.interp(w[2], cosines, through[0]) for w in (wo, wi))
+    albedo, inside = column(COLOR), 1 - escaping[0]
+    base = albedo / (1 - (albedo * inside if nonlinear else inside))
+    gloss = Plastic(0, 0.5, 1.4, **options).f(wo, wi)
+    found = Plastic(COLOR, 0.5, 1.4, **options).f(wo, wi) - gloss
+    assert found == pytest.approx(base * seen * lit / (np.pi * 1.4**2), rel=1e-3, abs=1e-5)
+
+
+def test_what_is_reflected_inside_a_rough_boundary_that_scatters_once():
+    """The mean of a table of rough glass seen from inside, weighted with cosines at its columns."""
+    _, _, escaping = boundary_tables(1.5, 0.5, False, False, False)
+    glass, u = Dielectric(1 / 1.5, 0.5, multiscatter=False), np.random.default_rng(0).random((3, 20_000), F4)
+    cosines, reflected = np.linspace(0, 1, 64), []
+    for mu in np.maximum(cosines, 1e-6):
+        wo = np.repeat(column([np.sqrt(1 - mu * mu), 0, mu]).astype(F4), u.shape[1], 1)
+        sample = glass.sample_f(wo, u)
+        reflected.append(np.where(sample.wi[2] > 0, sample.weight[0], 0).mean(dtype=float))
+    assert 1 - escaping[0] == pytest.approx(2 * np.mean(cosines * reflected), abs=3e-3)
 
 
 @pytest.mark.parametrize("roughness", [0.2, 0.6])
