@@ -20,10 +20,10 @@ their noise, whose means are compared first. Printed are, for each side:
 - the mean of the pictures of most samples over that of the reference;
 - what a fresh process takes besides, once: importing the renderer, loading the scene, compiling. It is
   the time of a process of its own, with an empty cache of compiled kernels, less that of a warm render;
-- time to the error that `llvm_ad_rgb independent` has at its largest sample count, by straight lines
-  between the measured points on logarithmic axes, and beyond the last by the last two (marked *); a side
-  whose fewest samples have less error than that is given their time (marked <);
-- speed at that error relative to `llvm_ad_rgb independent`, warm, and cold with what comes once added.
+- speed to each error that `llvm_ad_rgb independent` has, relative to its own, by straight lines between
+  the measured points on logarithmic axes, and beyond the last by the last two (marked *); a side whose
+  fewest samples have less error than that is given their time (marked <);
+- speed to the last of these errors with what comes once added ("cold").
 
 With `--blur 1.5` a second table has the errors of the same pictures after a Gaussian blur of 1.5 pixels,
 of the picture and of the reference: noise that neighbors share does not vanish there. With `--keep FILE`
@@ -84,9 +84,14 @@ class Subject:
     build: Callable[[], wf.Scene]
     max_bounces: int
     spp: tuple[int, ...]
+    own_spp: tuple[int, ...]  # of wavefront, as many
     methods: tuple[str, ...]  # of wavefront
     exact: str  # the method of the converged picture of wavefront
     cycles: tuple[str, ...] = ()  # methods of Cycles
+
+    def counts(self, side: str) -> tuple[int, ...]:
+        """Return the sample counts of a side."""
+        return self.own_spp if side.startswith("wavefront") else self.spp
 
 
 def mesh_scene(data: Path | None, size: int) -> wf.Scene:
@@ -160,7 +165,7 @@ def first(side: str, options: argparse.Namespace, name: str) -> float:
 
 def print_first(side: str, subject: Subject) -> None:
     """Print how long a first render takes in this process, the scene's arrays being there already."""
-    scene, fewest = subject.build(), subject.spp[:1]
+    scene, fewest = subject.build(), subject.counts(side)[:1]
     begin = time.perf_counter()
     renderer(side, scene, subject.max_bounces, fewest)(fewest[0], 0)
     seconds = time.perf_counter() - begin
@@ -226,20 +231,21 @@ def measure(name: str, subject: Subject, options: argparse.Namespace) -> dict[st
     if options.prepare:
         return {}
     sides = {
-        each: renderer(each, scene, subject.max_bounces, subject.spp, options.bpy_python) for each in names
+        each: renderer(each, scene, subject.max_bounces, subject.counts(each), options.bpy_python)
+        for each in names
     }
     for side, render in sides.items():  # warm up; Mitsuba may compile anew for each sample count
-        for spp in subject.spp[:1] if side.startswith("wavefront") else subject.spp:
+        for spp in subject.own_spp[:1] if side.startswith("wavefront") else subject.spp:
             render(spp, 0)
     found: dict[str, Any] = {side: {"errors": [], "blurred": [], "seconds": []} for side in sides}
-    for spp in subject.spp:
+    for place in range(len(subject.spp)):
         rows: dict[str, list[tuple[float, ...]]] = {side: [] for side in sides}
         for seed in range(options.repeat):
             # in changing order, as a side may be slower after another one
             for side in names if seed % 2 == 0 else names[::-1]:
                 time.sleep(PAUSE)
                 begin = time.perf_counter()
-                picture = sides[side](spp, seed)
+                picture = sides[side](subject.counts(side)[place], seed)
                 seconds = time.perf_counter() - begin
                 soft = relative_mse(*(blurred(p, options.blur) for p in (picture, exact)))
                 ratio = picture.mean(dtype=float) / exact.mean()
@@ -256,33 +262,31 @@ def measure(name: str, subject: Subject, options: argparse.Namespace) -> dict[st
             if options.warm or side.startswith("cycles")
             else max(0.0, first(side, options, name) - of["seconds"][0])
         )
-    report(found, subject.spp, base, "errors")
+    report(found, subject, base, "errors")
     if options.blur:
         print(f"after a blur of {options.blur} pixels")
-        report(found, subject.spp, base, "blurred")
+        report(found, subject, base, "blurred")
     return found
 
 
-def report(found: dict[str, Any], counts: tuple[int, ...], base: str, key: str) -> None:
-    """Print error and time per sample count, and the time to equal error."""
-    target = found[base][key][-1]
-    head = "".join(f"{f'{spp} spp':>19}" for spp in counts)
-    print(
-        f"{'relMSE in seconds':29}{head}{'mean':>8}{'once':>7}{'to ' + format(target, '.2g'):>11}"
-        f"{'warm':>8}{'cold':>7}"
-    )
-    base_time = found[base]["seconds"][-1]
+def report(found: dict[str, Any], subject: Subject, base: str, key: str) -> None:
+    """Print error and time per sample count, and the speed to each error that the base has."""
+    targets, base_times = found[base][key], found[base]["seconds"]
+    counts = zip(subject.own_spp, subject.spp, strict=True)
+    heads = [str(spp) if own == spp else f"{own} or {spp}" for own, spp in counts]
+    head = "".join(f"{f'{counts} spp':>19}" for counts in heads)
+    speeds = "".join(f"{format(target, '.2g'):>10}" for target in targets)
+    print(f"{'relMSE in seconds':29}{head}{'mean':>8}  speed to{speeds}{'once':>7}{'cold':>7}")
     for side, of in found.items():
         errors = of[key]
         cells = "".join(f"{f'{e:.5f} in {s:.2f}':>19}" for e, s in zip(errors, of["seconds"], strict=True))
-        reached, beyond = time_to(target, errors, of["seconds"])
+        row = ""
+        for target, base_time in zip(targets, base_times, strict=True):
+            reached, beyond = time_to(target, errors, of["seconds"])
+            mark = "*" if beyond else "<" if target > errors[0] else " "
+            row += f"{base_time / reached:8.2f}x{mark}"
         cold = (base_time + found[base]["once"]) / (reached + of["once"])
-        mark = "*" if beyond else "<" if target > errors[0] else " "
-        print(
-            f"{side:29}{cells}{of['mean']:8.4f}{of['once']:7.2f}{reached:10.2f}{mark}"
-            f"{base_time / reached:7.2f}x{cold:6.2f}x",
-            flush=True,
-        )
+        print(f"{side:29}{cells}{of['mean']:8.4f}{'':10}{row}{of['once']:7.2f}{cold:6.2f}x", flush=True)
 
 
 COLORS = {
@@ -345,6 +349,11 @@ def joined(found: dict[str, Any], kept: Path | None) -> dict[str, Any]:
     return everything
 
 
+def counts_in(text: str) -> tuple[int, ...]:
+    """Return the sample counts that a text such as 4,16,64 names."""
+    return tuple(int(count) for count in text.split(","))
+
+
 def subjects(options: argparse.Namespace) -> dict[str, Subject]:
     """Return all scenes by name."""
     size, spp = options.size, (4, 16, 64)
@@ -352,17 +361,19 @@ def subjects(options: argparse.Namespace) -> dict[str, Subject]:
     methods = (*hard, "independent", "bluenoise", DENOISED)
     box = (*methods, "reused/4")
     found = {
-        "cornell": Subject(lambda: cornell_box(size), 7, spp, box, "reused", (GUIDED, DENOISED)),
-        "mesh": Subject(lambda: mesh_scene(options.data, size), 7, spp, methods, "plain"),
-        "studio": Subject(partial(SCENES["mesh, studio"][0], size), 7, spp, methods, "plain"),
-        "hdri": Subject(lambda: hdri_scene(size), 7, spp, methods, "plain"),
-        "lights": Subject(lambda: lit("panels", 1000, size), 3, spp, methods, "plain"),
+        "cornell": Subject(lambda: cornell_box(size), 7, spp, spp, box, "reused", (GUIDED, DENOISED)),
+        "mesh": Subject(lambda: mesh_scene(options.data, size), 7, spp, spp, methods, "plain"),
+        "studio": Subject(partial(SCENES["mesh, studio"][0], size), 7, spp, spp, methods, "plain"),
+        "hdri": Subject(lambda: hdri_scene(size), 7, spp, spp, methods, "plain"),
+        "lights": Subject(lambda: lit("panels", 1000, size), 3, spp, spp, methods, "plain"),
     }
     for name, build in HARD_SCENES.items():
-        found[name] = Subject(partial(build, size), 12, (16, 64, 256), hard, "guided/reused", (GUIDED,))
+        hard_spp = (16, 64, 256)
+        found[name] = Subject(partial(build, size), 12, hard_spp, hard_spp, hard, "guided/reused", (GUIDED,))
     if options.spp:
-        counts = tuple(int(count) for count in options.spp.split(","))
-        found = {name: replace(subject, spp=counts) for name, subject in found.items()}
+        spp = counts_in(options.spp)
+        own = counts_in(options.own_spp) if options.own_spp else spp
+        found = {name: replace(subject, spp=spp, own_spp=own) for name, subject in found.items()}
     return found
 
 
@@ -374,6 +385,7 @@ if __name__ == "__main__":
     parser.add_argument("--data", type=Path, help="folder that holds rocker-arm.obj")
     parser.add_argument("--size", type=int, default=256)
     parser.add_argument("--spp", help="sample counts, such as 4,16,64")
+    parser.add_argument("--own-spp", help="those of wavefront, as many, where they differ")
     parser.add_argument("--methods", help=f"of wavefront, some of {','.join(METHODS)}")
     parser.add_argument("--accel", default="numpy,embree", help="accelerators of wavefront")
     parser.add_argument("--blur", type=float, default=0.0, help="pixels; prints a second table")
