@@ -97,3 +97,13 @@ def test_each_branch_has_a_light_sample() -> None:
     one, four = (repeat(scene, 4, branches=branches, **how) for branches in (1, 4))
     assert four.var(0).mean() < 0.3 * one.var(0).mean()
     assert_same_images(one, four, max_error=0.02)
+
+
+def test_branches_choose_other_lights() -> None:
+    """Four branches below four lights of the same power take one each: nothing is left of the noise."""
+    floor = wf.Rectangle((-2, 0, 2), (4, 0, 0), (0, 0, -4), material=wf.Diffuse(0.5))
+    lights = [wf.PointLight((x, 1, z), 1) for x in (-1, 0.4) for z in (-0.6, 0.8)]
+    camera = wf.Camera.look_at((1, 0.5, 1.5), (0.5, 0, 0.6), fov=0.01, size=(4, 4))
+    how = {"max_bounces": 1, "light_sampler": "uniform", "reuse": False}
+    one, four = (repeat(wf.Scene([floor], lights, camera), 1, branches=n, **how) for n in (1, 4))
+    assert four.std(0).max() < 1e-3 * four.mean() < 1e-2 * one.std(0).mean()
