@@ -13,7 +13,7 @@ from measurements import adaptive_fields, tensor_file
 
 import wavefront as wf
 from wavefront.codecs.images import write_image
-from wavefront.colors.spectrum import spectrum_rgb
+from wavefront.colors.spectrum import blackbody_spectrum, spectrum_rgb
 from wavefront.io.losses import Losses
 from wavefront.io.mitsuba import convert as _  # noqa: F401  fills the table
 from wavefront.io.mitsuba.nodes import PLUGINS, Node
@@ -428,6 +428,127 @@ def test_spectra() -> None:
     assert warm[0] > 2 * warm[1] > 6 * warm[2]
     white = spectrum_rgb([(360, 1), (830, 1)], emission=False, bounded=True)
     assert white == pytest.approx([1, 1, 1], 2e-3)
+
+
+RISING = [(400.0, 0.2), (500.0, 0.3), (600.0, 0.6), (700.0, 0.8)]
+STEEP = [(wave, 5 * each) for wave, each in RISING]
+PLANCK = [(wave, float(power)) for wave, power in blackbody_spectrum(3000.0)]
+FLAT = [(360.0, 3.0), (830.0, 3.0)]
+# a plugin; what RGB variants of Mitsuba take for it, as these have no `regular`, `irregular` and `blackbody`;
+# and what they make of that (3.9.1, scalar_rgb): as light, as an albedo, and as eta and k. Their sums over
+# wavelengths are 0.1 % too small: the step is a 1000th of the range, and there are 1000 points
+SPECTRA: dict[str, tuple[dict[str, Any], dict[str, Any], tuple[Any, Any, Any]]] = {
+    "regular": (
+        {"type": "regular", "values": "3, 3", "wavelength_min": 360.0, "wavelength_max": 830.0},
+        {"type": "spectrum", "value": FLAT},
+        ([3.6147, 2.8447, 2.7278], [1, 1, 1], [2.997, 2.9966, 2.9964]),
+    ),
+    "irregular": (
+        {"type": "irregular", "wavelengths": "400, 500, 600, 700", "values": "1, 1.5, 3, 4"},
+        {"type": "spectrum", "value": STEEP},
+        ([4.1377, 2.0168, 1.0012], [1, 1, 1], [3.5422, 2.1134, 1.1286]),
+    ),
+    "spectrum": (
+        {"type": "spectrum", "value": "400:0.2, 500:0.3, 600:0.6, 700:0.8"},
+        {"type": "spectrum", "value": RISING},
+        ([0.8275, 0.4034, 0.2002], [0.7085, 0.4227, 0.2257], [0.7085, 0.4227, 0.2257]),
+    ),
+    "constant spectrum": (
+        {"type": "spectrum", "value": 0.5},
+        {"type": "spectrum", "value": 0.5},
+        ([0.6024, 0.4742, 0.4545], [0.5] * 3, [0.5] * 3),
+    ),
+    "blackbody": (
+        {"type": "blackbody", "temperature": 3000.0},
+        {"type": "spectrum", "value": PLANCK},
+        ([733.08, 349.58, 112.71], [1, 1, 1], [626.7, 366.53, 130.88]),
+    ),
+    "uniform": ({"type": "uniform", "value": 0.5}, {"type": "uniform", "value": 0.5}, ([0.5] * 3,) * 3),
+    "rawconstant": (
+        {"type": "rawconstant", "value": [0.1, 0.2, 0.4]},
+        rgb(0.1, 0.2, 0.4),
+        ([0.1, 0.2, 0.4],) * 3,
+    ),
+    "d65": (
+        {"type": "d65", "color": rgb(0.1, 0.2, 0.4), "scale": 2.0},
+        rgb(0.2, 0.4, 0.8),
+        ([0.2, 0.4, 0.8],) * 3,
+    ),
+    "d65 alone": ({"type": "d65", "scale": 0.5}, {"type": "d65", "scale": 0.5}, ([0.5] * 3,) * 3),
+    "d65 in d65": (
+        {"type": "d65", "nested": {"type": "regular", "values": "3, 3"}},
+        {"type": "spectrum", "value": FLAT},
+        ([3.6147, 2.8447, 2.7278], [1, 1, 1], [2.997, 2.9966, 2.9964]),
+    ),
+    "srgb": ({"type": "srgb", "color": rgb(0.1, 0.2, 0.4)}, rgb(0.1, 0.2, 0.4), ([0.1, 0.2, 0.4],) * 3),
+    "rgb": (rgb(0.1, 0.2, 0.4), rgb(0.1, 0.2, 0.4), ([0.1, 0.2, 0.4],) * 3),
+}
+
+
+def colors_of(spectrum: dict[str, Any]) -> list[list[float]]:
+    """Return what a spectrum is as light, as an albedo and as the index of a metal."""
+    lamp, clay = light("constant", radiance=spectrum), material("diffuse", reflectance=spectrum)
+    metal = material("roughconductor", eta=spectrum, k=spectrum)
+    assert value(metal.bsdf.eta) == value(metal.bsdf.k)
+    area = shape("sphere", emitter={"type": "area", "radiance": spectrum})
+    assert value(area.emission) == value(lamp.radiance)
+    return [value(each) for each in (lamp.radiance, clay.bsdf.reflectance, metal.bsdf.eta)]
+
+
+@pytest.mark.parametrize("name", SPECTRA)
+def test_spectra_are_the_colors_of_their_use(name: str) -> None:
+    given, known = SPECTRA[name][::2]
+    for found, due in zip(colors_of(given), known, strict=True):
+        assert found == pytest.approx(due, 2e-3, 1e-4)
+
+
+@pytest.mark.parametrize("name", SPECTRA)
+def test_spectra_are_the_colors_that_they_are_in_mitsuba(name: str) -> None:
+    mitsuba = pytest.importorskip("mitsuba")
+    mitsuba.set_variant("scalar_rgb")
+    mitsuba.set_log_level(mitsuba.LogLevel.Error)
+
+    def loaded(key: str, **plugin: Any) -> Any:
+        return np.broadcast_to(mitsuba.traverse(mitsuba.load_dict(plugin))[f"{key}.value"], 3)
+
+    given, theirs = SPECTRA[name][:2]
+    due = [
+        loaded("radiance", type="constant", radiance=theirs),
+        loaded("reflectance", type="diffuse", reflectance=theirs),
+        loaded("eta", type="conductor", eta=theirs, k=theirs),
+    ]
+    for found, expected in zip(colors_of(given), due, strict=True):
+        np.testing.assert_allclose(found, expected, 2e-3, 1e-6 * max(expected))
+
+
+def test_one_spectrum_has_two_uses() -> None:
+    """Light and an albedo may refer to the same plugin."""
+    flat = {"type": "regular", "id": "flat", "values": "0.5, 0.5"}
+    ref = {"type": "ref", "id": "flat"}
+    made = scene(
+        flat=flat,
+        ball={"type": "sphere", "b": {"type": "diffuse", "reflectance": ref}},
+        sky={"type": "constant", "radiance": ref},
+    )
+    bsdf: Any = made.shapes[0].material.bsdf
+    assert value(bsdf.reflectance) == pytest.approx([0.5] * 3, 2e-3)
+    assert value(made.lights[0].radiance) == pytest.approx([0.6024, 0.4741, 0.4545], 2e-3)  # type: ignore[attr-defined]
+
+
+def test_spectra_above_one() -> None:
+    flat = {"type": "regular", "values": "3, 3"}
+    assert value(material("principledthin", eta=flat).bsdf.ior) == pytest.approx([3], 2e-3)
+    for each in (flat, {"type": "constvolume", "value": flat}):
+        fog = {"type": "homogeneous", "sigma_t": each, "albedo": 0.5}
+        assert shape("sphere", interior=fog).material.interior.sigma_s.ravel() == pytest.approx(
+            [1.5] * 3, 2e-3
+        )
+
+
+def test_spectra_whose_numbers_do_not_match_are_refused() -> None:
+    uneven = {"type": "irregular", "wavelengths": "400, 500", "values": "1, 2, 3"}
+    with pytest.raises(wf.SceneError, match="has 2 wavelengths and 3 values"):
+        material("diffuse", reflectance=uneven)
 
 
 def test_spectrum_files(tmp_path: Path) -> None:

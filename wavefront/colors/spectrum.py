@@ -97,12 +97,17 @@ def uniform_emission(value: float) -> Doubles:
 
 def blackbody(temperature: float) -> Doubles:
     """Return the radiance (3,) of a black body of a temperature in kelvin, W·sr⁻¹·m⁻²·nm⁻¹."""
+    pairs = blackbody_spectrum(temperature)
+    return spectrum_rgb(pairs, emission=True, bounded=False)  # type: ignore[arg-type]
+
+
+def blackbody_spectrum(temperature: float) -> Doubles:
+    """Return wavelengths in nm and the radiance there, W·sr⁻¹·m⁻²·nm⁻¹, of a black body, (k, 2)."""
     kelvin = number("temperature", temperature, lambda x: 100 <= x <= 1e6, "from 100 to 1e6 kelvin")
     meters = (np.arange(len(X)) * STEP + FIRST) * 1e-9
     fall = exp((-PLANCK[1] / (meters * kelvin)).astype(f4)).astype(float)
     power = PLANCK[0] / (meters * meters) ** 2 / meters * fall / (1 - fall) * 1e-9
-    pairs = np.stack([meters * 1e9, power], 1)
-    return spectrum_rgb(pairs, emission=True, bounded=False)  # type: ignore[arg-type]
+    return np.stack([meters * 1e9, power], 1)
 
 
 COLDEST, HOTTEST, TABULATED = 300.0, 1e5, 512  # kelvin, and how many between

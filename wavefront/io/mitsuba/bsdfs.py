@@ -29,7 +29,7 @@ from ...textures.image import Texture
 from ...textures.normal_map import BumpMap, NormalMap
 from ..spectra import INDICES, METALS
 from .nodes import Job, Node, plugin, unsupported
-from .textures import bitmap, color, roughness, scalar
+from .textures import as_color, bitmap, color, roughness, scalar
 
 LEAST_INDEX = 1e-6
 MAPPED = "use_shadowing_function flip_invalid_normals"
@@ -69,7 +69,7 @@ def _conductor(node: Node, job: Job) -> Material:
     if "eta" in node.values or name == "none":
         if node.plugin == "conductor" and "eta" not in node.values:
             return _named(node, Mirror(tint))
-        eta, k = color(node, "eta", 0.0, job), color(node, "k", 1.0, job)
+        eta, k = (color(node, each, to, job, "unbounded") for each, to in (("eta", 0.0), ("k", 1.0)))
         eta = eta if isinstance(eta, BaseTexture) else np.maximum(eta, LEAST_INDEX)
         k = k if isinstance(k, BaseTexture) else np.maximum(k, 0)
     else:
@@ -191,9 +191,9 @@ def _facets(node: Node, job: Job) -> dict[str, Any]:
 
 
 def _index_of_reflectance(node: Node, job: Job) -> dict[str, Any]:
-    """Return the index that eta gives, or specular, which is the normal reflectance over 0.08."""
+    """Return the index by specular, which is the normal reflectance over 0.08, where there is no eta."""
     if "eta" in node.values:
-        return {"ior": node.number("eta", 1.5)}
+        return {}
     part = node.number("specular", 0.5, lambda x: 0 <= x <= 1, "in [0, 1]")
     root = np.sqrt(0.08 * part)
     return {"ior": float((1 + root) / (1 - root))}
@@ -203,6 +203,7 @@ def _index_of_reflectance(node: Node, job: Job) -> dict[str, Any]:
 OTHERS: dict[str, Callable[[Node, Job], dict[str, Any]]] = {
     "int_ior": _relative_index,
     "distribution": _facets,
+    "eta": lambda node, job: {"ior": scalar(node, "eta", 1.5, job, "unbounded")},
     "specular": _index_of_reflectance,
     "nonlinear": lambda node, job: {"nonlinear": node.flag("nonlinear")},
 }
@@ -256,7 +257,8 @@ _model(
     "principledthin",
     ThinDisney,
     "base_color:0.5",
-    f"roughness:0.5 ior=eta:1.5 {SHEEN} diffuse_transmission=diff_trans:0",
+    f"roughness:0.5 {SHEEN} diffuse_transmission=diff_trans:0",
+    "eta",
     harmless="diffuse_reflectance_sampling_rate specular_reflectance_sampling_rate "
     "diffuse_transmittance_sampling_rate specular_transmittance_sampling_rate",
 )

@@ -14,7 +14,7 @@ from ...lights import DirectionalLight, Environment, Light, PointLight, Projecto
 from ...scene.sun_position import sun_position
 from ...textures.base import BaseTexture
 from .nodes import Job, Node, plugin, unsupported
-from .textures import color, picture, pixels
+from .textures import Use, color, picture, pixels
 from .views import FIELD_OF_VIEW, vertical_fov
 
 DATE = (("year", 2010, 9999), ("month", 7, 12), ("day", 10, 31))
@@ -24,7 +24,7 @@ LEAST_ROWS = 3  # of an environment map; one with fewer repeats its last
 
 
 # of an area light the radiance, which a shape emits
-plugin("area", "emitter", "radiance")(lambda node, job: color(node, "radiance", 1.0, job, emission=True))
+plugin("area", "emitter", "radiance")(lambda node, job: color(node, "radiance", 1.0, job, "light"))
 
 
 @plugin("point", "emitter", "position to_world intensity")
@@ -93,7 +93,7 @@ def _environment_map(node: Node, job: Job) -> Environment:
 def _sun_and_sky(node: Node, job: Job) -> list[Light]:
     """Return the sky, whose zenith is z, and the disk of the sun."""
     up, sun = node.matrix()[:3, 2], _direction_of_sun(node)
-    albedo = _constant(node, "albedo", job, 0.3)
+    albedo = _constant(node, "albedo", job, 0.3, "albedo")
     of_sky, of_sun = node.number("sky_scale", 1.0), node.number("sun_scale", 1.0)
     if node.flag("complex_sun"):
         node.lose("complex_sun")
@@ -136,9 +136,9 @@ def _direction_of_sun(node: Node) -> Doubles:
 unsupported("directionalarea timed_sunsky", "emitter")
 
 
-def _constant(node: Node, name: str, job: Job, default: float = 1.0) -> Doubles:
+def _constant(node: Node, name: str, job: Job, default: float = 1.0, use: Use = "light") -> Doubles:
     """Return light of a point or from far away, (3,), or an albedo, which cannot vary."""
-    value = color(node, name, default, job, emission=name != "albedo")
+    value = color(node, name, default, job, use)
     if isinstance(value, BaseTexture):
         raise SceneError(f"{name} is a texture; it must be a color")
     return np.asarray(np.broadcast_to(value, 3), np.float64)

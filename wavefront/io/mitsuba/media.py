@@ -52,14 +52,16 @@ def coefficient(node: Node, name: str, default: float, job: Job) -> Doubles:
     if isinstance(value, Node) and value.kind == "volume":
         value = None if value.plugin == "gridvolume" else job.convert(value)
     else:
-        value = color(node, name, default, job)
+        value = color(node, name, default, job, "unbounded")
     if value is None or isinstance(value, BaseTexture):
         node.lose(name)
         value = default
     return np.broadcast_to(np.asarray(value, np.float64), 3)
 
 
-plugin("constvolume", "volume", "value to_world", "texture")(lambda node, job: color(node, "value", 1.0, job))
+plugin("constvolume", "volume", "value to_world", "texture")(
+    lambda node, job: color(node, "value", 1.0, job, "unbounded")
+)
 plugin("isotropic", "phase")(lambda node, job: Isotropic())
 plugin("rayleigh", "phase")(lambda node, job: Rayleigh())
 plugin("hg", "phase", "g")(lambda node, job: HenyeyGreenstein(node.number("g", 0.8)))

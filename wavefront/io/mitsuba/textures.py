@@ -7,8 +7,7 @@ flips it.
 from __future__ import annotations
 
 from copy import copy
-from functools import partial
-from typing import Any
+from typing import Any, Literal, NamedTuple, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,7 +15,7 @@ from numpy.typing import NDArray
 from ...arrays.state import SurfaceInteraction
 from ...arrays.vec import Doubles, Floats, luminance
 from ...colors import srgb_to_linear
-from ...colors.spectrum import blackbody, spectrum_rgb, uniform_emission
+from ...colors.spectrum import blackbody_spectrum, spectrum_rgb, uniform_emission
 from ...core.errors import SceneError, as_array, finite_array, in_brief, number
 from ...textures.base import BaseTexture
 from ...textures.image import Texture
@@ -28,6 +27,19 @@ from .nodes import Job, Node, plugin, unsupported
 MOST_VALUES = 10_000  # of a spectrum in a text
 FLIP = np.array([[1.0, 0, 0], [0, -1, 1], [0, 0, 1]])  # of v
 Value = Any  # a number, a color (3,) or a texture
+Use: TypeAlias = Literal["albedo", "light", "unbounded"]  # of a color: in [0, 1], emission, or neither
+
+
+class Spectrum(NamedTuple):
+    """Values by wavelength. Which color they are depends on their use."""
+
+    pairs: Any  # a wavelength in nm and a value in each row; or a number, for all wavelengths
+
+    def color(self, use: Use) -> Value:
+        """Return a number or a color (3,)."""
+        if isinstance(self.pairs, float):
+            return uniform_emission(self.pairs) if use == "light" else self.pairs
+        return spectrum_rgb(self.pairs, emission=use == "light", bounded=use == "albedo")
 
 
 class SquareRoot(BaseTexture):
@@ -48,21 +60,27 @@ class SquareRoot(BaseTexture):
         return np.sqrt(values if values.ndim == 1 else luminance(values))
 
 
-def color(node: Node, name: str, default: Any, job: Job, *, emission: bool = False) -> Value:
+def color(node: Node, name: str, default: Any, job: Job, use: Use = "albedo") -> Value:
     """Return a parameter that is a number, a color or a texture."""
+    return as_color(_given(node, name, default, job), use)
+
+
+def as_color(made: Any, use: Use) -> Value:
+    """Return what became of a texture, spectra as colors."""
+    return made.color(use) if isinstance(made, Spectrum) else made
+
+
+def _given(node: Node, name: str, default: Any, job: Job) -> Any:
+    """Return a parameter that is a number, a color, a texture, or a `Spectrum`."""
     value = node.get(name, default)
     if not isinstance(value, Node):
         return number(name, value)
-    if value.plugin in ("rgb", "spectrum"):
-        return constant(
-            value, job, emission=emission, bounded=not emission and name not in ("eta", "k", "sigma_t")
-        )
     if value.kind != "texture":
         raise SceneError(f"{name} is a {value.kind}; it must be a texture")
     return job.convert(value)
 
 
-def scalar(node: Node, name: str, default: float, job: Job) -> Value:
+def scalar(node: Node, name: str, default: float, job: Job, use: Use = "albedo") -> Value:
     """Return a parameter that is a number or a texture of numbers; a color counts by its luminance."""
     value = node.get(name, default)
     if isinstance(value, Node) and value.plugin == "bitmap":
@@ -70,7 +88,7 @@ def scalar(node: Node, name: str, default: float, job: Job) -> Value:
     if isinstance(value, Node) and value.plugin == "checkerboard":
         job.check(value)
         return _board(value, job, channel=0)
-    value = color(node, name, default, job)
+    value = color(node, name, default, job, use)
     return value if isinstance(value, BaseTexture | float | int) else float(luminance(value))
 
 
@@ -82,24 +100,6 @@ def roughness(node: Node, name: str, default: float, job: Job) -> Value:
     return float(np.sqrt(number(name, alpha, lambda x: 0 <= x <= 1, "in [0, 1]")))
 
 
-def constant(node: Node, job: Job, *, emission: bool, bounded: bool) -> Value:
-    """Return a number, or a color (3,), of an rgb or spectrum."""
-    job.check(node)
-    if node.plugin == "rgb":
-        value = node.get("value")
-        return finite_array("rgb", np.broadcast_to(value, 3) if np.ndim(value) == 0 else value, (3,))
-    if "filename" in node.values:
-        pairs: Any = job.spectrum(node.text("filename"))
-    elif "wavelengths" in node.values:
-        columns = [listed(node, name) for name in ("wavelengths", "values")]
-        pairs = list(zip(*columns, strict=False))
-    else:
-        pairs = pairs_of("value", node.get("value"))
-    if isinstance(pairs, float):
-        return uniform_emission(pairs) if emission else pairs
-    return spectrum_rgb(pairs, emission=emission, bounded=bounded)
-
-
 def listed(node: Node, name: str) -> list[float]:
     """Return the numbers of a parameter, given as a text or as a list."""
     value = node.get(name, "")
@@ -108,38 +108,67 @@ def listed(node: Node, name: str) -> list[float]:
     return numbers("", name, value, range(1, MOST_VALUES))
 
 
-_plain = partial(constant, emission=False, bounded=True)
-plugin("rgb", "texture", "value")(_plain)
-plugin("spectrum irregular", "texture", "value filename wavelengths values")(_plain)
-plugin("blackbody", "texture", "temperature")(lambda node, job: blackbody(node.number("temperature", 5000.0)))
+@plugin("rgb", "texture", "value")
+def _rgb(node: Node, job: Job) -> Doubles:
+    value = node.get("value")
+    return finite_array("rgb", np.broadcast_to(value, 3) if np.ndim(value) == 0 else value, (3,))
+
+
+@plugin("spectrum", "texture", "value filename")
+def _spectrum(node: Node, job: Job) -> Spectrum:
+    if "filename" in node.values:
+        return Spectrum(job.spectrum(node.text("filename")))
+    return Spectrum(pairs_of("value", node.get("value")))
+
+
+@plugin("irregular", "texture", "wavelengths values")
+def _irregular(node: Node, job: Job) -> Spectrum:
+    return Spectrum(_pairs(listed(node, "wavelengths"), listed(node, "values")))
+
+
+@plugin("regular", "texture", "values wavelength_min wavelength_max")
+def _regular(node: Node, job: Job) -> Spectrum:
+    values = listed(node, "values")
+    first, last = node.number("wavelength_min", 360.0), node.number("wavelength_max", 830.0)
+    return Spectrum(_pairs(np.linspace(first, last, len(values)), values))
+
+
+def _pairs(wavelengths: Any, values: list[float]) -> list[tuple[float, float]]:
+    if len(wavelengths) != len(values):
+        raise SceneError(f"has {len(wavelengths)} wavelengths and {len(values)} values")
+    return list(zip(wavelengths, values, strict=True))
+
+
+plugin("blackbody", "texture", "temperature")(
+    lambda node, job: Spectrum(blackbody_spectrum(node.number("temperature", 5000.0)))
+)
 plugin("mesh_attribute", "texture", "name scale", note="one for each shape, of ply files, in [0, 1]")(
     lambda node, job: VertexColors(node.number("scale", 1.0))
 )
 
 
-@plugin("regular", "texture", "values wavelength_min wavelength_max")
-def _regular(node: Node, job: Job) -> Value:
-    values = listed(node, "values")
-    at = np.linspace(node.number("wavelength_min", 360), node.number("wavelength_max", 830), len(values))
-    return spectrum_rgb(list(zip(at, values, strict=True)), emission=False, bounded=True)
-
-
-@plugin("uniform rawconstant", "texture", "value")
-def _uniform(node: Node, job: Job) -> Value:
+@plugin("uniform rawconstant", "texture", "value", note="gray also as a light")
+def _uniform(node: Node, job: Job) -> Any:
     value = node.get("value", 1.0)
     if isinstance(value, Node) or np.ndim(value) == 0:
-        return color(node, "value", 1.0, job)
+        return _given(node, "value", 1.0, job)
     return node.vector("value", None)
 
 
-@plugin("srgb d65", "texture", "color value scale")
-def _srgb(node: Node, job: Job) -> Value:
-    base = color(node, "color" if "color" in node.values else "value", 1.0, job, emission=True)
+plugin("srgb", "texture", "color", harmless="unbounded")(lambda node, job: _given(node, "color", 1.0, job))
+
+
+@plugin("d65", "texture", "color scale", "texture")
+def _d65(node: Node, job: Job) -> Any:
+    """Return a color, or the texture in it; D65 itself is white."""
+    inside = node.held("texture")
+    base = job.convert(inside[0]) if inside else _given(node, "color", 1.0, job)
     factor = node.number("scale", 1.0)
-    if factor == 1 or not isinstance(base, BaseTexture):
-        return base if factor == 1 else factor * np.asarray(base)
-    node.lose("scale")
-    return base
+    if isinstance(base, BaseTexture | Spectrum):
+        if factor != 1:
+            node.lose("scale")
+        return base
+    return factor * np.asarray(base)
 
 
 @plugin("bitmap", "texture", "filename bitmap data raw to_uv wrap_mode filter_type", harmless="accel format")
@@ -162,7 +191,7 @@ def bitmap(node: Node, job: Job, channel: Any = None, plain: bool = False) -> Te
 
 def picture(node: Node, name: str, job: Job) -> Texture:
     """Return an image that a light shows, with its first row at the top."""
-    value = color(node, name, 1.0, job, emission=True)
+    value = color(node, name, 1.0, job, "light")
     if not isinstance(value, BaseTexture):
         return Texture(np.broadcast_to(value, (1, 1, 3)).astype(np.float32))
     if not isinstance(value, Texture):
