@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+import importlib.util
+import re
 import struct
+import warnings
 import zlib
 from pathlib import Path
 from typing import Any
@@ -347,6 +350,17 @@ def test_adapters() -> None:
     assert (type(mix.first), type(mix.second), value(mix.weight)) == (wf.Diffuse, wf.Mirror, [0.75])
     flat = {"type": "bitmap", "data": np.full((2, 2, 3), (0.5, 0.5, 1), np.float32), "raw": True}
     assert material("normalmap", bsdf=inner, normalmap=flat).normal_map is not None
+
+
+def test_steps_have_no_slopes() -> None:
+    """In Mitsuba bitmaps of filter_type nearest have the slope 0, and a checkerboard has none at all."""
+    inner = {"type": "diffuse"}
+    texels = {"type": "bitmap", "data": np.eye(2, dtype=np.float32)[..., None], "raw": True}
+    assert material("bumpmap", bsdf=inner, map=texels).normal_map is not None
+    assert material("bumpmap", bsdf=inner, map={**texels, "filter_type": "nearest"}).normal_map is None
+    with pytest.warns(UserWarning, match="bumpmap.*: a map by checkerboard"):
+        found = material("bumpmap", False, bsdf=inner, map={"type": "checkerboard"})
+    assert found.normal_map is None
 
 
 def test_a_normal_map_is_in_the_frame_of_the_shading_normal() -> None:
@@ -739,6 +753,26 @@ def test_settings() -> None:
     assert scene(integrator={"type": "path"}).settings["max_bounces"] > 1000
 
 
+@pytest.mark.parametrize("pixels", ["rgb", "rgba", "xyz", "xyza", "luminance", "luminance_alpha"])
+def test_pixel_formats(pixels: str) -> None:
+    """Formats with alpha leave transparent what no ray meets; an environment is met everywhere."""
+    view = {"type": "perspective", "film": {"type": "hdrfilm", "pixel_format": pixels}}
+    lost = f"pixel_format '{pixels}'; its colors are rgb"
+    if not pixels.startswith("rgb"):
+        with pytest.raises(wf.SceneError, match=lost):
+            scene(view=view)
+    with warnings.catch_warnings():
+        warnings.filterwarnings("ignore", f".*{lost}")
+        alone = scene(False, view=view)
+        before_sky = scene(False, view=view, sky={"type": "constant"})
+        measured = scene(False, view={**view, "type": "radiancemeter"})
+    assert alone.settings.get("background") == ("transparent" if pixels.endswith("a") else None)
+    assert "background" not in before_sky.settings
+    assert "background" not in measured.settings
+    with pytest.raises(wf.SceneError, match="pixel_format is 'cmyk'"):
+        scene(view={**view, "film": {"type": "hdrfilm", "pixel_format": "cmyk"}})
+
+
 def test_settings_of_a_scene_are_checked() -> None:
     ball = wf.Sphere((0, 0, 0), 1)
     with pytest.raises(wf.SceneError, match=r"a setting of the scene is 'sp'; .*did you mean 'spp'"):
@@ -862,6 +896,22 @@ def test_unsupported_plugins_are_named(name: str) -> None:
     assert made.shapes
     with pytest.raises(wf.SceneError, match="not honored"):
         scene(True, **parts)
+
+
+def test_every_plugin_of_mitsuba_is_known() -> None:
+    """Those of its shared libraries and those that its Python code registers."""
+    spec = importlib.util.find_spec("mitsuba")
+    if spec is None or spec.origin is None:
+        pytest.skip("mitsuba is not installed")
+    folder = Path(spec.origin).parent
+    compiled = {path.stem for path in (folder / "plugins").iterdir()}
+    sources = "".join(path.read_text() for path in (folder / "python").rglob("*.py"))
+    registered = re.findall(r"register_(\w+)\(\s*\"(\w+)\"", sources)
+    assert len(compiled) > 80
+    assert len(registered) > 5
+    assert not compiled - PLUGINS.keys()
+    for kind, name in registered:
+        assert PLUGINS[name].kind == kind
 
 
 def test_one_warning_names_plugin_id_and_parameter() -> None:

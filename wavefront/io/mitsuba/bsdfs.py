@@ -121,7 +121,7 @@ def _blend(node: Node, job: Job) -> Material:
     return _named(node, Mix(one, two, scalar(node, "weight", 0.5, job)))
 
 
-@plugin("bumpmap", "bsdf", f"scale {MAPPED}", holds="bsdf texture")
+@plugin("bumpmap", "bsdf", f"scale {MAPPED}", holds="bsdf texture", note="nearest texels have no slopes")
 def _bump(node: Node, job: Job) -> Material:
     return _mapped(node, job, lambda image: BumpMap(image, node.number("scale", 1.0)), "luminance")
 
@@ -149,13 +149,15 @@ def _mapped(node: Node, job: Job, make: Any, channel: Any) -> Material:
     if image.plugin == "bitmap":
         texture = bitmap(image, job, channel, plain=True)
     else:
-        value = job.convert(image)
-        if isinstance(value, BaseTexture) and not isinstance(value, Texture):
+        value = as_color(job.convert(image), "albedo")
+        if isinstance(value, BaseTexture) and (channel is not None or not isinstance(value, Texture)):
             node.lose(f"a map by {image.plugin}")
             return material
         if not isinstance(value, Texture):
             value = Texture(np.broadcast_to(value, 3).astype(np.float32).reshape(1, 1, 3), channel=channel)
         texture = value
+    if channel is not None and texture.filter == "nearest":
+        return material  # steps have no slopes
     normal_map = make(texture)
     normal_map.folds_light = False
     normal_map.shadows_grazing = node.flag("use_shadowing_function", True)

@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from ...camera import Sensors, SurfaceSensors
+from ...lights import Environment, Sky
 from ...scene import Scene
 from ..repair import RawMesh
 from ..sources import SceneFiles
@@ -71,6 +72,8 @@ def _scene(node: Node, job: Job) -> Scene:
     lamps = [part for part in node.held("emitter") if part.plugin != "area"]
     made = [light for part in lamps if (light := job.convert(part)) is not None]
     lights = [light for each in made for light in (each if isinstance(each, list) else [each])]
+    if any(isinstance(light, Environment | Sky) for light in lights):  # the alpha of the film is 1
+        settings = {name: each for name, each in settings.items() if name != "background"}
     for integrator in integrators[:1]:
         settings = settings | job.convert(integrator)
     if seen and camera is None:

@@ -190,7 +190,7 @@ def _instance(node: Node, job: Job) -> list[Shape]:
     return placed
 
 
-unsupported("bsplinecurve linearcurve ellipsoids ellipsoidsmesh", "shape")
+unsupported("blender bsplinecurve linearcurve ellipsoids ellipsoidsmesh", "shape")
 
 
 def _mesh(node: Node, job: Job, raw: RawMesh, smooth: bool = False, closed: bool = False) -> list[Shape]:

@@ -24,6 +24,9 @@ NO_CLIPPING = "near_clip and far_clip do not cut; named where they would"
 FIELD_OF_VIEW = "fov fov_axis focal_length"
 SURFACES = ("path", "direct", "ptracer", "prb")  # integrators that see no media
 METER = "measures at one place, whatever the size of its film"
+FILM = "width height crop_width crop_height crop_offset_x crop_offset_y"
+PIXELS = ("rgb", "rgba", "xyz", "xyza", "luminance", "luminance_alpha")
+UNSEEN = "file_format component_format sample_border compensate high_quality_edges banner"  # in the picture
 LENS = f"{FIELD_OF_VIEW} principal_point_offset_x principal_point_offset_y"
 
 
@@ -63,7 +66,7 @@ def _picture(node: Node, job: Job) -> tuple[tuple[int, int], Crop, Settings]:
 
 def _meter_settings(node: Node, job: Job) -> Settings:
     """Return the settings of a sensor that is no camera: only the light of the scene counts."""
-    return _picture(node, job)[2] | {"filter": "box", "lighting": None}
+    return _picture(node, job)[2] | {"filter": "box", "lighting": None, "background": None}
 
 
 @plugin("radiancemeter", "sensor", "to_world origin direction", "film sampler medium", note=METER)
@@ -93,21 +96,21 @@ def meter_on(shapes: Sequence[Shape]) -> SurfaceSensors | None:
     return SurfaceSensors(corners, np.array([len(corners)]), ball, "irradiance")
 
 
-@plugin(
-    "hdrfilm specfilm",
-    "film",
-    "width height crop_width crop_height crop_offset_x crop_offset_y pixel_format",
-    holds="rfilter",
-    harmless="file_format component_format sample_border compensate high_quality_edges banner",
-)
+@plugin("specfilm", "film", FILM, "rfilter", UNSEEN)
+@plugin("hdrfilm", "film", f"{FILM} pixel_format", "rfilter", UNSEEN, "luminance and xyz become rgb")
 def _film(node: Node, job: Job) -> tuple[tuple[int, int], Crop, Settings]:
     width, height = node.whole("width", 768, 1), node.whole("height", 576, 1)
     left, top = node.whole("crop_offset_x", 0), node.whole("crop_offset_y", 0)
     right, bottom = left + node.whole("crop_width", width, 1), top + node.whole("crop_height", height, 1)
     whole = (left, top, right, bottom) == (0, 0, width, height)
     filters = node.held("rfilter")
-    settings = job.convert(filters[0]) if filters else {"filter": "gaussian"}
-    return (width, height), None if whole else (left, top, right, bottom), dict(settings)
+    settings = dict(job.convert(filters[0]) if filters else {"filter": "gaussian"})
+    pixels = "rgb" if node.plugin == "specfilm" else node.choice("pixel_format", "rgb", PIXELS)
+    if not pixels.startswith("rgb"):
+        node.lose(f"pixel_format {pixels!r}; its colors are rgb")
+    if pixels.endswith("a"):
+        settings["background"] = "transparent"
+    return (width, height), None if whole else (left, top, right, bottom), settings
 
 
 @plugin("box", "rfilter", "radius")
@@ -157,11 +160,10 @@ def sees_media(integrator: Node) -> bool:
     return integrator.plugin not in SURFACES and all(map(sees_media, integrator.held("integrator")))
 
 
-unsupported(
-    "depth stokes direct_projective prb_basic prb_projective prbvolpath emission_reparam", "integrator"
-)
+unsupported("depth stokes direct_projective prb_basic prb_projective prbvolpath", "integrator")
+unsupported("emission_reparam volprim_rf_basic", "integrator")
 unsupported("catmullrom lanczos mitchell", "rfilter")
-unsupported("batch distant", "sensor")
+unsupported("batch distant flat_sensor", "sensor")
 
 
 def check_clipping(node: Node, camera: Camera, shapes: Sequence[Shape]) -> None:
