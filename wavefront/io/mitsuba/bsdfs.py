@@ -22,7 +22,7 @@ from ...bsdfs import (
     ThinDielectric,
     ThinDisney,
 )
-from ...core.errors import SceneError, number, one_of
+from ...core.errors import SceneError, in_brief, number, one_of
 from ...materials import Material
 from ...textures.base import BaseTexture
 from ...textures.image import Texture
@@ -123,12 +123,16 @@ def _blend(node: Node, job: Job) -> Material:
 
 @plugin("bumpmap", "bsdf", f"scale {MAPPED}", holds="bsdf texture", note="nearest texels have no slopes")
 def _bump(node: Node, job: Job) -> Material:
-    return _mapped(node, job, lambda image: BumpMap(image, node.number("scale", 1.0)), "luminance")
+    image = job.only(node, "texture")
+    return _mapped(node, job, image, lambda heights: BumpMap(heights, node.number("scale", 1.0)), "luminance")
 
 
 @plugin("normalmap", "bsdf", f"normalmap {MAPPED}", holds="bsdf")
 def _normal(node: Node, job: Job) -> Material:
-    return _mapped(node, job, ShadingFrameMap, None)
+    image = node.get("normalmap")
+    if not isinstance(image, Node) or image.kind != "texture":
+        raise SceneError(f"normalmap is {in_brief(image)}; it must be a texture")
+    return _mapped(node, job, image, ShadingFrameMap, None)
 
 
 unsupported("circular hair measured_polarized polarizer pplastic retarder", "bsdf")
@@ -139,10 +143,9 @@ def _inner(node: Node, job: Job) -> Material:
     return material
 
 
-def _mapped(node: Node, job: Job, make: Any, channel: Any) -> Material:
+def _mapped(node: Node, job: Job, image: Node, make: Any, channel: Any) -> Material:
     """Return the material in a plugin, with a map of its normals."""
     material = _inner(job.only(node, "bsdf"), job)
-    image = job.only(node, "texture")
     if material.normal_map is not None:
         node.lose("the map, as there is another in its bsdf")
         return material

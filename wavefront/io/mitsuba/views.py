@@ -19,7 +19,7 @@ Settings = dict[str, Any]
 Crop = tuple[int, int, int, int] | None
 MOST_CHECKED = 1 << 16  # points of a shape that are compared with the planes of a sensor
 ENDLESS = 2**16  # bounces, where there is no limit
-CLIPPED = "to_world near_clip far_clip focus_distance"
+CLIPPED = "to_world near_clip far_clip"
 NO_CLIPPING = "near_clip and far_clip do not cut; named where they would"
 FIELD_OF_VIEW = "fov fov_axis focal_length"
 SURFACES = ("path", "direct", "ptracer", "prb")  # integrators that see no media
@@ -27,12 +27,13 @@ METER = "measures at one place, whatever the size of its film"
 FILM = "width height crop_width crop_height crop_offset_x crop_offset_y"
 PIXELS = ("rgb", "rgba", "xyz", "xyza", "luminance", "luminance_alpha")
 UNSEEN = "file_format component_format sample_border compensate high_quality_edges banner"  # in the picture
+HELD = "film sampler medium"
 LENS = f"{FIELD_OF_VIEW} principal_point_offset_x principal_point_offset_y"
 
 
-@plugin("perspective", "sensor", f"{CLIPPED} {LENS}", "film sampler medium", note=NO_CLIPPING)
-@plugin("thinlens", "sensor", f"{CLIPPED} aperture_radius {LENS}", "film sampler medium", note=NO_CLIPPING)
-@plugin("orthographic", "sensor", CLIPPED, "film sampler medium", note=NO_CLIPPING)
+@plugin("perspective", "sensor", f"{CLIPPED} {LENS}", HELD, "focus_distance", NO_CLIPPING)
+@plugin("thinlens", "sensor", f"{CLIPPED} aperture_radius focus_distance {LENS}", HELD, note=NO_CLIPPING)
+@plugin("orthographic", "sensor", CLIPPED, HELD, "focus_distance", NO_CLIPPING)
 def _sensor(node: Node, job: Job) -> tuple[Camera, Settings]:
     size, crop, settings = _picture(node, job)
     matrix = node.matrix()
@@ -69,7 +70,7 @@ def _meter_settings(node: Node, job: Job) -> Settings:
     return _picture(node, job)[2] | {"filter": "box", "lighting": None, "background": None}
 
 
-@plugin("radiancemeter", "sensor", "to_world origin direction", "film sampler medium", note=METER)
+@plugin("radiancemeter", "sensor", "to_world origin direction", HELD, note=METER)
 def _radiance_meter(node: Node, job: Job) -> tuple[Camera, Settings]:
     origin, direction = node.matrix()[:3, [3, 2]].T
     if "to_world" not in node.values and {"origin", "direction"} & node.values.keys():
@@ -138,7 +139,7 @@ def _sampler(node: Node, job: Job) -> Settings:
 
 @plugin("path volpath volpathmis ptracer prb", "integrator", "max_depth rr_depth hide_emitters")
 @plugin("direct", "integrator", "hide_emitters", harmless="shading_samples emitter_samples bsdf_samples")
-@plugin("moment aov", "integrator", "hide_emitters", "integrator", harmless="aovs", note="that in it counts")
+@plugin("moment aov", "integrator", "", "integrator", "aovs hide_emitters", "that in it counts")
 def _integrator(node: Node, job: Job) -> Settings:
     if node.plugin in ("moment", "aov"):
         return dict(job.convert(job.only(node, "integrator")))
@@ -186,11 +187,13 @@ def check_clipping(node: Node, camera: Camera, shapes: Sequence[Shape]) -> None:
 
 def _lens(node: Node, aspect: float) -> Perspective:
     """Return the lens of a perspective camera."""
-    focus = node.number("focus_distance", node.number("far_clip", 1e4))
-    aperture = node.number("aperture_radius", 0.0) if node.plugin == "thinlens" else 0.0
     shift = (node.number("principal_point_offset_x", 0.0), -node.number("principal_point_offset_y", 0.0))
+    aperture, focus = 0.0, None
+    if node.plugin == "thinlens":
+        aperture = 2 * node.number("aperture_radius", 0.0)
+        focus = node.number("focus_distance", node.number("far_clip", 1e4))
     return Perspective(
-        vertical_fov(node, aspect), shift=shift, aperture=2 * aperture, focus=focus if aperture else None
+        vertical_fov(node, aspect), shift=shift, aperture=aperture, focus=focus if aperture else None
     )
 
 
