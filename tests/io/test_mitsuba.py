@@ -773,6 +773,48 @@ def test_pixel_formats(pixels: str) -> None:
         scene(view={**view, "film": {"type": "hdrfilm", "pixel_format": "cmyk"}})
 
 
+@pytest.mark.parametrize(
+    ("integrator", "hidden"),
+    [
+        ({"type": "path", "hide_emitters": True}, True),
+        ({"type": "path"}, False),
+        ({"type": "moment", "inner": {"type": "volpath", "hide_emitters": True}}, True),
+        ({"type": "moment", "hide_emitters": True, "inner": {"type": "path"}}, False),
+    ],
+    ids=str,
+)
+def test_hidden_emitters(integrator: dict[str, Any], hidden: bool) -> None:
+    """They are not seen by the camera, nor is the environment."""
+    lamp = {"type": "rectangle", "bsdf": {"type": "diffuse", "id": "clay"}, "emitter": {"type": "area"}}
+    board = {"type": "rectangle", "bsdf": {"type": "ref", "id": "clay"}}
+    made = scene(lamp=lamp, ball={"type": "sphere", "lamp": {"type": "area"}}, board=board, i=integrator)
+    assert [each.material.visible_to_camera for each in made.shapes] == [not hidden, not hidden, True]
+    assert made.settings.get("background") == ("transparent" if hidden else None)
+
+
+def test_hidden_emitters_beside_mitsuba() -> None:
+    """A lamp hides a part of a board that it lights; both faces of it are passed."""
+    mitsuba = pytest.importorskip("mitsuba")
+    mitsuba.set_variant("scalar_rgb")
+    place, turned = np.diag([-1.0, 1, -1, 1]), np.diag([0.4, 0.4, -0.4, 1.0])
+    place[2, 3], turned[2, 3] = 4, 1
+    film = {"type": "hdrfilm", "width": 8, "height": 8, "rfilter": {"type": "box"}}
+    view = {"type": "perspective", "fov": 40.0, "to_world": place, "film": film}
+    parts: dict[str, Any] = {
+        "i": {"type": "path", "max_depth": 4, "hide_emitters": True},
+        "view": view | {"sampler": {"type": "independent", "sample_count": 256}},
+        "board": {"type": "rectangle", "bsdf": {"type": "twosided", "b": {"type": "diffuse"}}},
+        "lamp": {"type": "rectangle", "to_world": turned, "emitter": {"type": "area", "radiance": 5.0}},
+    }
+    ours = np.asarray(wf.render(scene(**parts), progress=False).rgb)
+    for part in (parts["view"], parts["lamp"]):
+        part["to_world"] = mitsuba.ScalarTransform4f(part["to_world"])
+    theirs = np.asarray(mitsuba.render(mitsuba.load_dict({"type": "scene", **parts})))
+    assert ours[3:5, 3:5].min() > 0.1
+    np.testing.assert_allclose(ours[2:6, 2:6].mean(), theirs[2:6, 2:6].mean(), 0.02)
+    np.testing.assert_allclose(ours.mean(), theirs.mean(), 0.02)
+
+
 def test_settings_of_a_scene_are_checked() -> None:
     ball = wf.Sphere((0, 0, 0), 1)
     with pytest.raises(wf.SceneError, match=r"a setting of the scene is 'sp'; .*did you mean 'spp'"):

@@ -28,6 +28,7 @@ from .materials import (
     find_alpha,
     find_nonscattering_lights,
     find_shadow_catchers,
+    find_unseen,
     group_materials,
     number_materials,
     opacity_table,
@@ -75,6 +76,7 @@ class CompiledScene:
     instances: InstanceTable | None = None  # None when no mesh is instanced
     places: MortonGrid | None = None  # orders the paths of large scenes; None in small ones
     shadow_catchers: Bools | None = None  # (materials,) those that catch shadows; None when none does
+    unseen: Bools | None = None  # (materials,) those that camera rays pass; None when there are none
     background: Floats | None = None  # (3, 1) what camera rays that miss show; None for the environment
     backdrop: InfiniteLight | None = None  # what they show of the environment; None for all of its light
     roulette_after: float = ROULETTE_AFTER  # scattering events before Russian roulette may end paths
@@ -221,6 +223,7 @@ def compile_scene(
         backdrop=find_backdrop(scene, scale, center),
         instances=table,
         shadow_catchers=find_shadow_catchers(user_materials),
+        unseen=find_unseen(user_materials),
         specular_surfaces=specular,
         media=media,
         places=MortonGrid.over((high - low) / 2) if len(triangles) >= LARGE else None,

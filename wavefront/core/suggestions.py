@@ -108,6 +108,7 @@ MATERIAL_ARGUMENTS: dict[str, str] = {
     "interior": "wf.Material(bsdf, interior=...)",
     "normal_map": "wf.Material(bsdf, normal_map=...)",
     "opacity": "wf.Material(bsdf, alpha=...)",
+    "visible_to_camera": "wf.Material(bsdf, visible_to_camera=...)",
     "with_alpha": "wf.Material(bsdf, alpha=...)",
     "with_normal_map": "wf.Material(bsdf, normal_map=...)",
 }

@@ -190,10 +190,13 @@ def _first(scene: CompiledScene, specular: SpecularSurfaces, rays: ShadowRays) -
     return ~((found.t < 2 * away) & (found.prim < specular.found_as.take(rays.exclude_prim)))
 
 
-def _transmittance(scene: CompiledScene, rays: ShadowRays) -> Floats:
-    """Return the transmittance (3, n), or (n,) where all surfaces are opaque, of rays that may be blocked."""
-    if scene.opacities is not None:
-        return transmittance_along(scene, rays)
+def _transmittance(scene: CompiledScene, rays: ShadowRays, absent: Bools | None = None) -> Floats:
+    """Return the transmittance (3, n), or (n,) where all surfaces are opaque, of rays that may be blocked.
+
+    `absent` says which materials (materials,) are not there for them.
+    """
+    if scene.opacities is not None or absent is not None:
+        return transmittance_along(scene, rays, absent)
     return visible(scene, rays).astype(f4)
 
 
@@ -301,7 +304,7 @@ def _connect(
         distance=distance.take(lit),
         cos_light=broadcast(f4(1), lit.size),
     )
-    radiance = take(radiance, lit) * _transmittance(scene, rays)
+    radiance = take(radiance, lit) * _transmittance(scene, rays, scene.unseen)
     if scene.absorption is not None:
         _absorb(scene, radiance, seen, wo, rays.distance)
     at = lanes.take(lit)
@@ -313,8 +316,9 @@ def _seen(scene: CompiledScene, camera: Camera, film: Doubles, hits: Hits, n: in
     x0, y0, x1, y1 = camera.window
     x, y = film
     inside = (x >= x0) & (x < x1) & (y >= y0) & (y < y1)
-    if scene.shadow_catchers is not None:
-        inside &= ~scene.shadow_catchers.take(material_rows(scene, hits, slice(n)))
+    for left_out in (scene.shadow_catchers, scene.unseen):
+        if left_out is not None:
+            inside &= ~left_out.take(material_rows(scene, hits, slice(n)))
     return np.flatnonzero(inside)
 
 

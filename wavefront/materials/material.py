@@ -13,7 +13,7 @@ from ..bsdfs import Bsdf
 from ..bsdfs.base import is_bsdf
 from ..core.errors import SceneError, number
 from ..core.html import preview_html
-from ..core.parameter import Parameter, Parametrized, instance_of, optional, parametrized
+from ..core.parameter import Parameter, Parametrized, flag, instance_of, optional, parametrized
 from ..core.suggestions import suggests_keywords
 from ..film.aov_names import DEFAULT_GROUP, group_name
 from ..media import BaseMedium
@@ -70,6 +70,9 @@ class Material(Parametrized):
         relative to what is around.
     name
         The name of the material in `Image.names`; materials of files have that of the file.
+    visible_to_camera
+        False: the camera sees what is behind the surface, also in AOVs. Mirrors and glass show it, and it
+        shines and casts shadows: light in the picture that does not cover anything.
 
     Attributes
     ----------
@@ -96,6 +99,7 @@ class Material(Parametrized):
     priority: Parameter[int | None] = Parameter(optional(_priority), default=None, kw_only=True)
     group: Parameter[str] = Parameter(group_name, default=DEFAULT_GROUP, kw_only=True)
     name: Parameter[str | None] = Parameter(optional(instance_of(str, "text")), default=None, kw_only=True)
+    visible_to_camera: Parameter[bool] = Parameter(flag, default=True, kw_only=True)
 
     @classmethod
     @suggests_keywords

@@ -21,6 +21,7 @@ from ..image import Image
 from ..lights import LightSample
 from ..scene import Scene
 from ..shapes import Instance, Shape
+from ..stages.alpha import covering_hits
 from ..stages.interaction import interaction, origin_above
 from ..stages.intersect import intersect, shadow_rays, visible
 from .prepared_scene import PreparedScene
@@ -91,7 +92,7 @@ class VisibilityProbe:
     def why_white(self, darkest: float) -> str:
         """Return the likely cause of a white picture."""
         fix = f"save(..., exposure={-int(np.ceil(np.log2(darkest)))}) shows what is below"
-        emits = self._compiled.emissive.take(self._hits.prim)
+        emits = self._compiled.emissive.take(self._met[1].prim)
         if not len(self._seen):
             return f"the camera sees no shape, only light from all around that is above 1; {fix}"
         if emits.all():
@@ -112,12 +113,12 @@ class VisibilityProbe:
         return Rays(origin, direction, np.full(GRID * GRID, -1, np.intp))
 
     @cached_property
-    def _hits(self) -> Hits:
-        return intersect(self._compiled, self._rays)
+    def _met(self) -> tuple[Rays, Hits]:
+        return covering_hits(self._compiled, self._rays)
 
     @cached_property
     def _seen(self) -> SurfaceInteraction:
-        return self._surface(self._rays, self._hits)
+        return self._surface(*self._met)
 
     @cached_property
     def _around(self) -> SurfaceInteraction:

@@ -1,4 +1,4 @@
-"""Alpha: paths and shadow rays at surfaces whose opacity is below 1.
+"""Alpha: paths and shadow rays at surfaces whose opacity is below 1, and camera rays at unseen surfaces.
 
 A path hits such a surface with a probability equal to its opacity there (stochastic alpha); otherwise it
 continues straight on from just behind the surface, which is not a scattering event. A shadow ray is
@@ -13,7 +13,7 @@ from dataclasses import replace
 import numpy as np
 
 from ..arrays.state import Hits, Paths, Rays, SurfaceInteraction
-from ..arrays.vec import Floats, Ints, f4, take
+from ..arrays.vec import ALL, Bools, Floats, Ints, f4, take
 from ..compile.scene import CompiledScene
 from ..core.errors import RenderError
 from ..sampling.sampler import Dimension, Sampler, numbers_of
@@ -42,20 +42,21 @@ def alpha_pass_through(
         If a ray meets more surfaces than there are random numbers for.
     """
     catches = bounce == 0 and scene.shadow_catchers is not None
+    absent = scene.unseen if bounce == 0 else None
     lanes = np.arange(len(paths))
     if scene.media is None:
-        lanes = _passable(scene, paths, hits, lanes, catches)
+        lanes = _passable(scene, paths, hits, lanes, catches, absent)
         if not lanes.size:
             return paths, hits
     paths = _own_columns(scene, paths)
     for dimension in numbers_of(Dimension.OPACITY):
         lanes = fly(scene, paths, hits, lanes, sampler, bounce, dimension - Dimension.OPACITY, mis)
-        lanes = _passable(scene, paths, hits, lanes, catches)
+        lanes = _passable(scene, paths, hits, lanes, catches, absent)
         if not lanes.size:
             return paths, hits
         here, at = paths.take(lanes), hits.take(lanes)
         surface = interaction(scene, here, at)
-        opacity = _opacities(scene, here, at, surface, sampler, catches)
+        opacity = _opacities(scene, here, at, surface, sampler, catches, absent)
         if opacity.any():
             u = sampler.draw_1d(here.pixel, here.sample, bounce, dimension)
             passing = np.flatnonzero(u >= opacity)
@@ -83,11 +84,14 @@ def _own_columns(scene: CompiledScene, paths: Paths) -> Paths:
     return replace(own, media=np.array(paths.media), throughput=np.array(paths.throughput), glow=glow)
 
 
-def _passable(scene: CompiledScene, paths: Paths, hits: Hits, lanes: Ints, catches: bool) -> Ints:
+def _passable(
+    scene: CompiledScene, paths: Paths, hits: Hits, lanes: Ints, catches: bool, absent: Bools | None
+) -> Ints:
     """Return those of some lanes (k,) that hit a surface that they may pass; with `catches`, catchers too."""
-    if scene.opacities is None and scene.media is None and not catches:
+    if scene.opacities is None and scene.media is None and absent is None and not catches:
         return lanes[:0]
-    found = passable(scene, hits, lanes, None if paths.media is None else take(paths.media, lanes))
+    stack = None if paths.media is None else take(paths.media, lanes)
+    found = passable(scene, hits, lanes, stack, absent)
     if catches:
         found[np.searchsorted(lanes, catcher_lanes(scene, hits, lanes))] = True
     return lanes.compress(found)
@@ -100,10 +104,11 @@ def _opacities(
     surface: SurfaceInteraction,
     sampler: Sampler,
     catches: bool,
+    absent: Bools | None,
 ) -> Floats:
     """Return the opacities (n,) of surfaces, with `catches` those of shadows on catchers."""
     everything = np.arange(len(surface))
-    opacity = opacities_at(scene, surface, paths.media)
+    opacity = opacities_at(scene, surface, paths.media, absent)
     lanes = catcher_lanes(scene, hits, everything) if catches else everything[:0]
     if lanes.size:
         opacity[lanes] *= shadow_opacity(scene, paths.take(lanes), surface.take(lanes), sampler)
@@ -111,22 +116,21 @@ def _opacities(
 
 
 def covering_hits(scene: CompiledScene, rays: Rays) -> tuple[Rays, Hits]:
-    """Return the nearest hits of rays on surfaces whose opacity is at least `COVERING`.
+    """Return the nearest hits of camera rays on surfaces whose opacity is at least `COVERING`.
 
     Nothing is random here. The rays that are returned start behind the last surface that they have passed.
     """
     hits = intersect(scene, rays)
-    if scene.opacities is None:
+    lanes = np.flatnonzero(passable(scene, hits, ALL, None, scene.unseen))
+    if not lanes.size:
         return rays, hits
-    has_alpha = scene.opacities.has_alpha
-    lanes = np.flatnonzero(has_alpha.take(hits.prim))
     rays = replace(rays, origin=rays.origin.copy(), exclude_prim=rays.exclude_prim.copy())
     while lanes.size:
         here, at = rays.take(lanes), hits.take(lanes)
         surface = interaction(scene, here, at)
-        passing = np.flatnonzero(scene.opacities.at(surface) < COVERING)
+        passing = np.flatnonzero(opacities_at(scene, surface, None, scene.unseen) < COVERING)
         lanes, here = lanes.take(passing), continue_behind(here.take(passing), surface.take(passing))
         rays.put(lanes, here)
         hits.put(lanes, intersect(scene, here))
-        lanes = lanes.compress(has_alpha.take(hits.prim.take(lanes)))
+        lanes = lanes.compress(passable(scene, hits, lanes, None, scene.unseen))
     return rays, hits

@@ -17,10 +17,11 @@ from .medium import absorb, arrives, cross, hidden, transmitted
 AnyRays = TypeVar("AnyRays", bound=Rays)
 
 
-def transmittance_along(scene: CompiledScene, rays: ShadowRays) -> Floats:
+def transmittance_along(scene: CompiledScene, rays: ShadowRays, absent: Bools | None = None) -> Floats:
     """Return the transmittance of shadow rays, (3, k).
 
-    Only rays that hit anything are traced on from surface to surface.
+    Only rays that hit anything are traced on from surface to surface. `absent` says which materials
+    (materials,) are not there for them.
     """
     part = np.ones_like(rays.direction)
     seen = visible(scene, rays)
@@ -36,7 +37,7 @@ def transmittance_along(scene: CompiledScene, rays: ShadowRays) -> Floats:
     while lanes.size:
         hits = intersect(scene, rays)
         between = hits.t < shadow_ray_length(rays)
-        passes = passable(scene, hits, ALL, rays.media)
+        passes = passable(scene, hits, ALL, rays.media, absent)
         part[:, lanes.compress(between & ~passes)] = 0
         if rays.media is not None:
             length = np.where(between, hits.t, rays.distance)
@@ -47,7 +48,7 @@ def transmittance_along(scene: CompiledScene, rays: ShadowRays) -> Floats:
         met = np.flatnonzero(between & passes)
         lanes, rays, hits = lanes.take(met), rays.take(met), hits.take(met)
         surface = interaction(scene, rays, hits)
-        left = part.take(lanes, 1) * (f4(1) - opacities_at(scene, surface, rays.media))
+        left = part.take(lanes, 1) * (f4(1) - opacities_at(scene, surface, rays.media, absent))
         absorb(scene, left, hits, surface)
         part[:, lanes] = left
         rays = replace(
@@ -62,22 +63,33 @@ def transmittance_along(scene: CompiledScene, rays: ShadowRays) -> Floats:
     return part
 
 
-def passable(scene: CompiledScene, hits: Hits, lanes: Lanes, stack: Any) -> Bools:
-    """Return whether some lanes (k,) hit surfaces that rays with stacks (4, k) may pass straight on."""
+def passable(
+    scene: CompiledScene, hits: Hits, lanes: Lanes, stack: Any, absent: Bools | None = None
+) -> Bools:
+    """Return whether some lanes (k,) hit surfaces that rays with stacks (4, k) may pass straight on.
+
+    `absent` says which materials (materials,) are not there for them.
+    """
     prim = take(hits.prim, lanes)
     found: Bools = np.zeros(prim.size, np.bool_)
     if scene.opacities is not None:
         found = scene.opacities.has_alpha.take(prim)  # a miss, -1, takes the last entry
     if stack is not None:
         found |= hidden(scene, stack, material_rows(scene, hits, lanes)) & (prim >= 0)
+    if absent is not None:
+        found |= absent.take(material_rows(scene, hits, lanes)) & (prim >= 0)
     return found
 
 
-def opacities_at(scene: CompiledScene, surface: SurfaceInteraction, stack: Any) -> Floats:
-    """Return the opacities (n,) of surfaces to rays with stacks (4, n)."""
+def opacities_at(
+    scene: CompiledScene, surface: SurfaceInteraction, stack: Any, absent: Bools | None = None
+) -> Floats:
+    """Return the opacities (n,) of surfaces to rays with stacks (4, n); those of `absent` materials are 0."""
     opacity: Floats = np.ones(len(surface), f4) if scene.opacities is None else scene.opacities.at(surface)
     if stack is not None:
         opacity[hidden(scene, stack, surface.material)] = 0
+    if absent is not None:
+        opacity[absent.take(surface.material)] = 0
     return opacity
 
 

@@ -68,22 +68,22 @@ def _scene(node: Node, job: Job) -> Scene:
     job.eye = None if camera is None else camera.origin
     integrators = node.held("integrator")
     job.sees_media = not integrators or sees_media(integrators[0])
+    followed = job.convert(integrators[0]) if integrators else {}
+    measures, hides = bool(seen) and (camera is None or isinstance(camera, Sensors)), "background" in followed
+    job.hides_lamps = hides and not measures
+    if hides and measures:
+        node.lose("hide_emitters for a sensor that measures light")
     found = [shape for part in parts for shape in job.convert(part)]
     lamps = [part for part in node.held("emitter") if part.plugin != "area"]
     made = [light for part in lamps if (light := job.convert(part)) is not None]
     lights = [light for each in made for light in (each if isinstance(each, list) else [each])]
-    if any(isinstance(light, Environment | Sky) for light in lights):  # the alpha of the film is 1
-        settings = {name: each for name, each in settings.items() if name != "background"}
-    for integrator in integrators[:1]:
-        settings = settings | job.convert(integrator)
+    settings = settings | followed
+    if measures or (not hides and any(isinstance(light, Environment | Sky) for light in lights)):
+        settings.pop("background", None)  # alpha is 1
     if seen and camera is None:
         camera = _meter(*seen[0][:2], job)
-    elif seen and not isinstance(camera, Sensors):
+    elif seen and not measures:
         check_clipping(seen[0][0], camera, found)
-    if isinstance(camera, Sensors) and settings.pop("background", None):
-        node.lose("hide_emitters for a sensor that measures light")
-    if settings.get("background") and any(shape.emission is not None for shape in found):
-        node.lose("hide_emitters for shapes that emit")
     scene = Scene(found, lights, camera, settings=settings, medium=medium_around(node, job))
     if isinstance(camera, Sensors) and found:
         scene.camera = camera.above(scene.bounds)

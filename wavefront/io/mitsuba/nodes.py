@@ -116,6 +116,7 @@ class Job(Conversion[Node]):
 
     eye: Doubles | None = None  # where the camera stands
     sees_media: bool = True  # whether the integrator does
+    hides_lamps: bool = False  # whether it hides shapes that emit from the camera
 
     def check(self, node: Node) -> None:
         """Note the parameters of a plugin that are not read."""

@@ -231,6 +231,8 @@ def _appearance(node: Node, job: Job, closed: bool = False) -> tuple[Material, A
     if one_sided and not closed:
         bsdf = job.once((id(material.bsdf), Sides), lambda: Sides(material.bsdf))
         material = job.changed(material, bsdf=bsdf)
+    if emitters and job.hides_lamps:
+        material = job.changed(material, visible_to_camera=False)
     return material, emission
 
 
