@@ -86,7 +86,12 @@ add(
     [ball(GREY), EMITTER],
     camera=wf.Camera.look_at((0.5, 1.5, 4), (0, 0.4, 0), aperture=0.3, size=(32, 24)),
 )
-add("panorama", [ball(GREY), EMITTER], camera=wf.Camera.panorama((1, 0.5, 1), size=(32, 16)))
+add(
+    "panorama",
+    [ball(GREY), EMITTER],
+    camera=wf.Camera.panorama((1, 0.5, 1), size=(32, 16)),
+    filter=wf.GaussianFilter(2.0, windowed=True),
+)
 add(
     "framed",
     [ball(GREY), EMITTER],

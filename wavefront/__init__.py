@@ -66,6 +66,7 @@ from .materials import Material, OpenPBR
 from .media import GridMedium, HenyeyGreenstein, Isotropic, Medium, PhaseFunction, PhaseMix, Rayleigh
 from .render import render
 from .sampling import warp
+from .sampling.filters import BoxFilter, GaussianFilter, TentFilter
 from .sampling.sampler import Sampler
 from .scene import Scene
 from .scene.lighting import studio
@@ -156,6 +157,7 @@ __all__ = [
     "Accelerator",
     "BaseTexture",
     "Box",
+    "BoxFilter",
     "Bsdf",
     "BsdfSample",
     "BumpMap",
@@ -176,6 +178,7 @@ __all__ = [
     "Emitters",
     "Environment",
     "Frame",
+    "GaussianFilter",
     "Geometry",
     "GridBox",
     "GridMedium",
@@ -231,6 +234,7 @@ __all__ = [
     "Sphere",
     "Spheres",
     "SpotLight",
+    "TentFilter",
     "Texture",
     "ThinDielectric",
     "ThinDisney",

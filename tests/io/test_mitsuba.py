@@ -20,6 +20,7 @@ from wavefront.colors.spectrum import blackbody_spectrum, spectrum_rgb
 from wavefront.io.losses import Losses
 from wavefront.io.mitsuba import convert as _  # noqa: F401  fills the table
 from wavefront.io.mitsuba.nodes import PLUGINS, Node
+from wavefront.sampling.filters import FILTERS as FILTERS_HERE
 
 OBJ = "v 0 0 0\nv 1 0 0\nv 0 1 0\nvt 0 0\nvt 1 0\nvt 0 1\nf 1/1 2/2 3/3\n"
 PLY = """ply
@@ -751,6 +752,44 @@ def test_settings() -> None:
     assert wf.render([wf.PointLight((0, 3, 0), 1), made], progress=False).spp == 7
     assert scene(integrator={"type": "direct"}).settings == {"max_bounces": 1}
     assert scene(integrator={"type": "path"}).settings["max_bounces"] > 1000
+
+
+FILTERS: dict[str, tuple[dict[str, Any], Any]] = {
+    "box": ({"type": "box"}, "box"),
+    "tent": ({"type": "tent"}, "tent"),
+    "wide tent": ({"type": "tent", "radius": 1.25}, wf.TentFilter(1.25)),
+    "gaussian": ({"type": "gaussian"}, wf.GaussianFilter(2.0, windowed=True)),
+    "narrow gaussian": ({"type": "gaussian", "stddev": 0.25}, wf.GaussianFilter(1.0, 0.25, windowed=True)),
+}
+
+
+def filter_of(**film: Any) -> Any:
+    return scene(view={"type": "perspective", "film": {"type": "hdrfilm", **film}}).settings["filter"]
+
+
+def test_filters() -> None:
+    for given, expected in FILTERS.values():
+        assert filter_of(rfilter=given) == expected
+    assert filter_of(rfilter={"type": "box", "radius": 0.75}) == wf.BoxFilter(0.75)
+    usual = FILTERS["gaussian"][1]
+    assert filter_of() == usual
+    assert scene(view={"type": "perspective"}).settings["filter"] == usual
+
+
+@pytest.mark.parametrize("name", FILTERS)
+def test_filters_are_those_of_mitsuba(name: str) -> None:
+    """Positions are distributed as its weights say."""
+    mitsuba = pytest.importorskip("mitsuba")
+    mitsuba.set_variant("scalar_rgb")
+    given, ours = FILTERS[name]
+    theirs = mitsuba.load_dict(given)
+    x = np.linspace(-theirs.radius(), theirs.radius(), 2001)[:-1] + theirs.radius() / 2000
+    below = np.cumsum([theirs.eval(each) for each in x])
+    u = np.full((2, 4096), 0.5, np.float32)
+    u[0] = (np.arange(4096) + 0.5) / 4096
+    offsets = (FILTERS_HERE.get(ours) if isinstance(ours, str) else ours)(u)[0] - 0.5
+    found = np.searchsorted(np.sort(offsets), x + theirs.radius() / 2000) / 4096
+    np.testing.assert_allclose(found, below / below[-1], atol=1e-3)
 
 
 @pytest.mark.parametrize("pixels", ["rgb", "rgba", "xyz", "xyza", "luminance", "luminance_alpha"])

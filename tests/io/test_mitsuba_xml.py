@@ -245,7 +245,8 @@ def test_the_command_line(tmp_path: Path, capsys: pytest.CaptureFixture[str]) ->
     {BALL}<emitter type="constant"/>"""
     path = write(tmp_path, body)
     assert main(["info", str(path), "-D", "w=12"]) == 0
-    assert "settings: filter gaussian, spp 2, max_bounces 2, roulette 5" in capsys.readouterr().out
+    told = capsys.readouterr().out
+    assert "settings: filter GaussianFilter(radius=2.0, stddev=0.5, windowed=True), spp 2, max_b" in told
     out = tmp_path / "out.npz"
     assert main(["render", str(path), "-D", "w=12", "-o", str(out), "--quiet"]) == 0
     image = wf.Image.load(out)

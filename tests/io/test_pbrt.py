@@ -105,18 +105,25 @@ def test_a_lens_has_pbrts_radius_and_distance(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("header", "expected"),
     [
-        ("", {"filter": "gaussian", "spp": 16, "max_bounces": 5}),
+        ("", {}),
         ('Sampler "zsobol" "integer pixelsamples" 64', {"spp": 64}),
         ('Sampler "stratified" "integer xsamples" 3 "integer ysamples" 5', {"spp": 15}),
         ('Integrator "path" "integer maxdepth" 9 "string lightsampler" "bvh"', {"max_bounces": 9}),
         ('PixelFilter "box"', {"filter": "box"}),
+        ('PixelFilter "box" "float xradius" 1 "float yradius" 1', {"filter": wf.BoxFilter(1.0)}),
+        ('PixelFilter "triangle"', {"filter": wf.TentFilter(2.0)}),
         ('PixelFilter "triangle" "float xradius" 1 "float yradius" 1', {"filter": "tent"}),
+        (
+            'PixelFilter "gaussian" "float xradius" 2 "float yradius" 2 "float sigma" 1',
+            {"filter": wf.GaussianFilter(2.0, 1.0, windowed=True)},
+        ),
         ('Option "seed" 4 Accelerator "bvh" TransformTimes 0 1 ColorSpace "srgb"', {}),
     ],
 )
 def test_settings(tmp_path: Path, header: str, expected: dict[str, Any]) -> None:
     found = load(tmp_path, BALL, header).settings
-    assert found == {"filter": "gaussian", "spp": 16, "max_bounces": 5} | expected
+    usual = {"filter": wf.GaussianFilter(1.5, 0.5, windowed=True), "spp": 16, "max_bounces": 5}
+    assert found == usual | expected
 
 
 @pytest.mark.parametrize(
@@ -738,8 +745,7 @@ def test_objects_are_placed_by_both_transforms(tmp_path: Path) -> None:
         ('Camera "realistic"', BALL, "camera 'realistic': a perspective camera in its place"),
         ('Scale 1 1 2 Camera "perspective"', BALL, "camera 'perspective': a transform that scales unevenly"),
         ('PixelFilter "mitchell"', BALL, "filter 'mitchell': the default in its place"),
-        ('PixelFilter "gaussian" "float sigma" 1', BALL, "filter 'gaussian': sigma"),
-        ('PixelFilter "triangle"', BALL, "filter 'triangle': its radius; 1 in its place"),
+        ('PixelFilter "triangle" "float xradius" 1', BALL, "filter 'triangle': yradius; 1 in its place"),
         ('Integrator "bdpt"', BALL, "integrator 'bdpt': path tracing in its place"),
         ('Integrator "randomwalk"', BALL, "integrator 'randomwalk': path tracing in its place"),
         ('Integrator "path" "bool regularize" true', BALL, "integrator 'path': regularize"),

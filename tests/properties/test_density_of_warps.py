@@ -20,7 +20,8 @@ SQUARE = {
     "uniform_triangle": EMPTY,
     "linear": st.tuples(st.tuples(*[st.floats(-0.96875, 0.96875, width=32)] * 2).map(lambda s: columns(*s))),
 }
-LINE = {"tent": st.tuples(st.floats(0.25, 4)), "gaussian": st.tuples(st.floats(0.2, 2), st.floats(0.5, 3))}
+BELL = st.tuples(st.floats(0.2, 2), st.floats(0.5, 3))  # σ and radius
+LINE = {"tent": st.tuples(st.floats(0.25, 4)), "gaussian": BELL, "windowed_gaussian": BELL}
 WITHOUT_POINT = ("uniform_cone_pdf",)  # constant densities, which take no point
 
 
@@ -60,11 +61,12 @@ def test_density_of_points(name: str, data: st.DataObject, u: tuple[float, float
 @given(data=st.data(), u=inner)
 def test_density_of_offsets(name: str, data: st.DataObject, u: float) -> None:
     more = data.draw(LINE[name])
-    if name == "gaussian":
+    if len(more) == 2:
         assume(0.4 < more[1] / more[0] < 5)
     sample, pdf, inverse = of(name)
-    # the inverse error function is a fit with an error of 3e-7, which differences do not see
-    rounding = 1e-4 if name == "gaussian" else 2e-6
+    # the inverse error function is a fit with an error of 3e-7, which differences do not see; the windowed
+    # density is constant in cells, at whose edges the slopes on both sides differ
+    rounding = {"gaussian": 1e-4, "windowed_gaussian": 5e-3}.get(name, 2e-6)
     with doubles():
         x = sample(np.array([u]), *more)
         assume(abs(x[0]) < 0.999 * more[-1])  # not clipped
@@ -134,17 +136,32 @@ def test_density_of_spherical_rectangles(corner, a, b, turn, u) -> None:
         np.testing.assert_allclose(seen.inverse(seen.sample(columns(*u)))[:, 0], u, atol=1e-5)
 
 
-@pytest.mark.parametrize("name", sorted(filters.FILTERS))
+DENSITIES = {  # of one coordinate
+    "box": lambda x: 1.0,
+    "tent": lambda x: warp.tent_pdf(x, 1.0),
+    "gaussian": lambda x: warp.gaussian_pdf(x, 0.5, 1.5),
+    "wide box": lambda x: 0.25,
+    "wide tent": lambda x: warp.tent_pdf(x, 2.0),
+    "wide gaussian": lambda x: warp.gaussian_pdf(x, 0.75, 2.0),
+}
+OWN = {
+    "wide box": filters.BoxFilter(2.0),
+    "wide tent": filters.TentFilter(2.0),
+    "wide gaussian": filters.GaussianFilter(2.0, 0.75),
+}
+
+
+def test_every_filter_is_here() -> None:
+    assert {*filters.FILTERS, *OWN} == set(DENSITIES)
+
+
+@pytest.mark.parametrize("name", DENSITIES)
 @some
 @given(u=points_of_the_square)
 def test_density_of_filters(name: str, u: tuple[float, float]) -> None:
     """Positions in a pixel: the product of the densities of both coordinates."""
-    density = {
-        "box": lambda x: 1.0,
-        "tent": lambda x: warp.tent_pdf(x, filters.TENT_RADIUS),
-        "gaussian": lambda x: warp.gaussian_pdf(x, filters.GAUSSIAN_SIGMA, filters.GAUSSIAN_RADIUS),
-    }[name]
+    density = DENSITIES[name]
     with doubles():
-        place = filters.FILTERS.find(name)
+        place = OWN.get(name) or filters.FILTERS.find(name)
         x, y = place(columns(*u))[:, 0] - 0.5
         assert_density(place, u, density(x) * density(y), 2e-4)

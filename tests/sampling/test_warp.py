@@ -159,6 +159,13 @@ FILTERS = {
         {"sigma": 0.5, "radius": 1.0},
         float(stats.truncnorm(-2, 2, scale=0.5).var()),
     ),
+    "windowed gaussian": (
+        warp.windowed_gaussian,
+        warp.windowed_gaussian_pdf,
+        warp.windowed_gaussian_inverse,
+        {"sigma": 0.5, "radius": 1.0},
+        0.15252612,
+    ),
 }
 filters = pytest.mark.parametrize("name", FILTERS)
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping
+from dataclasses import is_dataclass
 from typing import Any, Generic, TypeVar
 
 from .errors import SceneError, one_of
@@ -72,11 +73,15 @@ class Registry(Mapping[str, T], Generic[T]):
         return self._entries[one_of(setting or self.setting, value, self._entries)]
 
     def label(self, value: Any) -> str:
-        """Return the name of what `find` takes: its name in the table, else that of the function or class."""
+        """Return the name of what `find` takes: its name in the table, else that of the function or class.
+
+        Of a dataclass it is the call that makes it, with its parameters.
+        """
         if isinstance(value, str):
             return value
         named = (name for name, entry in self._entries.items() if entry is value)
-        return next(named, getattr(value, "__name__", type(value).__name__))
+        kind = repr(value) if is_dataclass(value) else type(value).__name__
+        return next(named, getattr(value, "__name__", kind))
 
     def register(self, name: str, thing: Any) -> None:
         """Add a thing under a name of its own.

@@ -16,11 +16,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..arrays.elementary import log, sin_cos, sin_cos_turns
-from ..arrays.vec import BELOW_ONE, INV_FOUR_PI, INV_PI, INV_TWO_PI, TINY, Floats, f4, positive
+from ..arrays.elementary import exp, log, sin_cos, sin_cos_turns
+from ..arrays.vec import BELOW_ONE, INV_FOUR_PI, INV_PI, INV_TWO_PI, TINY, Doubles, Floats, f4, positive
 
 HALF_PI = f4(np.pi / 2)
 QUARTER_PI = f4(np.pi / 4)
+CELLS = 4096  # of a density that is tabulated
 
 
 def cosine_hemisphere(u: Floats) -> Floats:
@@ -269,6 +270,38 @@ def gaussian_inverse(x: Floats, sigma: float = 0.5, radius: float = 1.5) -> Floa
     """Return the u (n,) that `gaussian` maps to x (n,)."""
     inside = math.erf(radius / (sigma * math.sqrt(2)))
     return f4(0.5) + f4(0.5 / inside) * _erf(x * f4(1 / (sigma * math.sqrt(2))))
+
+
+def windowed_gaussian(u: Floats, sigma: float = 0.5, radius: float = 2.0) -> Floats:
+    """Return offsets (n,) of a normal distribution less its density at ±radius, where it ends, for u (n,).
+
+    The density is constant in each of `CELLS` cells.
+    """
+    edges, below = _window(sigma, radius)
+    return np.interp(u, below, edges).astype(f4)
+
+
+def windowed_gaussian_pdf(x: Floats, sigma: float = 0.5, radius: float = 2.0) -> Floats:
+    """Return the density of `windowed_gaussian` at x (n,), per unit length; 0 beyond the radius."""
+    edges, below = _window(sigma, radius)
+    cell = np.clip(np.searchsorted(edges, x, "right") - 1, 0, CELLS - 1)
+    density = np.diff(below) * (CELLS / (2 * radius))
+    return np.where(np.abs(x) <= f4(radius), density.take(cell), 0).astype(f4)
+
+
+def windowed_gaussian_inverse(x: Floats, sigma: float = 0.5, radius: float = 2.0) -> Floats:
+    """Return the u (n,) that `windowed_gaussian` maps to x (n,)."""
+    edges, below = _window(sigma, radius)
+    return np.interp(x, edges, below).astype(f4)
+
+
+def _window(sigma: float, radius: float) -> tuple[Doubles, Doubles]:
+    """Return the edges of cells from -radius to radius, and what is below of `windowed_gaussian`."""
+    edges = np.linspace(-radius, radius, CELLS + 1)
+    at = np.append((edges[1:] + edges[:-1]) / 2, radius) / sigma
+    height = exp((-0.5 * at * at).astype(f4)).astype(np.float64)
+    below = np.append(0, np.cumsum(np.maximum(height[:-1] - height[-1], 0)))
+    return edges, below / below[-1]
 
 
 def _erfinv(y: Floats) -> Floats:

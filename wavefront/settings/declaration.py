@@ -321,7 +321,7 @@ class RenderSettings(TypedDict, total=False):
             "box",
             'The reconstruction filter, by which samples of a pixel are spread: "box" (evenly over the '
             'pixel), "tent" (radius 1 pixel) or "gaussian" (σ 0.5 pixels, cut off at 1.5 from the '
-            "center).",
+            "center); or a `BoxFilter`, `TentFilter` or `GaussianFilter`, which have a radius.",
             option="reconstruction filter",
             choices=FILTERS,
             identity=True,

@@ -11,6 +11,7 @@ from ...arrays.elementary import arctan2, sin_cos
 from ...camera import Camera, Sensors, SurfaceSensors
 from ...camera.projection import Orthographic, Perspective, Projection
 from ...core.errors import SceneError, number
+from ...sampling.filters import BoxFilter, GaussianFilter, TentFilter
 from ...shapes import Instance, Mesh, Shape, Sphere
 from ..text_lines import numbers
 from .nodes import Job, Node, plugin, unsupported
@@ -18,6 +19,7 @@ from .nodes import Job, Node, plugin, unsupported
 Settings = dict[str, Any]
 Crop = tuple[int, int, int, int] | None
 MOST_CHECKED = 1 << 16  # points of a shape that are compared with the planes of a sensor
+USUAL = {"filter": GaussianFilter(2.0, windowed=True)}  # where a film has no filter
 ENDLESS = 2**16  # bounces, where there is no limit
 CLIPPED = "to_world near_clip far_clip"
 NO_CLIPPING = "near_clip and far_clip do not cut; named where they would"
@@ -59,7 +61,7 @@ def _sensor(node: Node, job: Job) -> tuple[Camera, Settings]:
 def _picture(node: Node, job: Job) -> tuple[tuple[int, int], Crop, Settings]:
     """Return the size, the crop and the settings of the picture of a sensor."""
     film = node.held("film")
-    size, crop, settings = job.convert(film[0]) if film else ((768, 576), None, {"filter": "gaussian"})
+    size, crop, settings = job.convert(film[0]) if film else ((768, 576), None, dict(USUAL))
     for sampler in node.held("sampler"):
         settings = settings | job.convert(sampler)
     return size, crop, settings
@@ -67,7 +69,7 @@ def _picture(node: Node, job: Job) -> tuple[tuple[int, int], Crop, Settings]:
 
 def _meter_settings(node: Node, job: Job) -> Settings:
     """Return the settings of a sensor that is no camera: only the light of the scene counts."""
-    return _picture(node, job)[2] | {"filter": "box", "lighting": None, "background": None}
+    return _picture(node, job)[2] | {"filter": "box", "lighting": None}
 
 
 @plugin("radiancemeter", "sensor", "to_world origin direction", HELD, note=METER)
@@ -105,7 +107,7 @@ def _film(node: Node, job: Job) -> tuple[tuple[int, int], Crop, Settings]:
     right, bottom = left + node.whole("crop_width", width, 1), top + node.whole("crop_height", height, 1)
     whole = (left, top, right, bottom) == (0, 0, width, height)
     filters = node.held("rfilter")
-    settings = dict(job.convert(filters[0]) if filters else {"filter": "gaussian"})
+    settings = dict(job.convert(filters[0]) if filters else USUAL)
     pixels = "rgb" if node.plugin == "specfilm" else node.choice("pixel_format", "rgb", PIXELS)
     if not pixels.startswith("rgb"):
         node.lose(f"pixel_format {pixels!r}; its colors are rgb")
@@ -116,14 +118,16 @@ def _film(node: Node, job: Job) -> tuple[tuple[int, int], Crop, Settings]:
 
 @plugin("box", "rfilter", "radius")
 @plugin("tent", "rfilter", "radius")
-@plugin("gaussian", "rfilter", "stddev radius", note="ends at 1.5 pixels")
 def _filter(node: Node, job: Job) -> Settings:
-    if node.plugin == "gaussian" and node.number("stddev", 0.5) != 0.5:
-        node.lose("stddev")
-    usual = {"box": 0.5, "tent": 1.0, "gaussian": 2.0}[node.plugin]
-    if node.number("radius", usual) != usual:
-        node.lose("radius")
-    return {"filter": node.plugin}
+    kind = BoxFilter if node.plugin == "box" else TentFilter
+    radius = node.number("radius", kind.radius)
+    return {"filter": node.plugin if radius == kind.radius else kind(radius)}
+
+
+@plugin("gaussian", "rfilter", "stddev radius", note="ends at four times stddev")
+def _gaussian(node: Node, job: Job) -> Settings:
+    stddev = node.number("stddev", 0.5)
+    return {"filter": GaussianFilter(node.number("radius", 4 * stddev), stddev, windowed=True)}
 
 
 @plugin(

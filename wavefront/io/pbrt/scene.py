@@ -11,6 +11,7 @@ import numpy as np
 
 from ...arrays.vec import Doubles
 from ...core.errors import SceneError
+from ...sampling.filters import GaussianFilter
 from ...scene import Scene
 from ...shapes.transform import Matrix, rotation, translation
 from ..conversion import placed
@@ -93,7 +94,8 @@ class Reader:
         if self.stack:
             raise SceneError(f"{self.stack[-1][1]}: {self.stack[-1][0]} has no end")
         camera, film = self.options.get("Camera"), self.options.get("Film")
-        settings = {"filter": "gaussian", "spp": 16, "max_bounces": 5}  # of pbrt, where nothing is stated
+        # of pbrt, where nothing is stated
+        settings = {"filter": GaussianFilter(windowed=True), "spp": 16, "max_bounces": 5}
         job.exposure = exposure_of(film, camera)
         if camera is not None:
             job.world = mirror_of(camera.matrix)

@@ -9,6 +9,7 @@ import numpy as np
 from ...camera import Camera
 from ...camera.projection import Orthographic, Perspective, Projection
 from ...core.errors import SceneError
+from ...sampling.filters import BoxFilter, GaussianFilter, TentFilter
 from ...shapes.transform import Matrix
 from ..mitsuba.views import angle_of, half_tangent
 from .entities import Entity, Job, converts, unsupported
@@ -111,18 +112,18 @@ def _film(entity: Entity, job: Job) -> tuple[tuple[int, int], tuple[int, ...] | 
 
 
 _CROPS = (("pixelbounds", "integer"), ("cropwindow", "float"))
-# radius of each filter in pixels: of pbrt if it is not given, and here
-RADII = {"box": (0.5, 0.5), "triangle": (2.0, 1.0), "gaussian": (1.5, 1.5)}
+RADII = {"box": 0.5, "triangle": 2.0, "gaussian": 1.5}  # of filters, pixels, if they are not given
 
 
 @converts("filter", "box triangle gaussian")
 def _filter(entity: Entity, job: Job) -> Settings:
-    usual, own = RADII[entity.type]
-    if (entity.number("xradius", usual), entity.number("yradius", usual)) != (own, own):
-        entity.lose(f"its radius; {own:g} in its place")
-    if entity.type == "gaussian" and entity.number("sigma", 0.5) != 0.5:
-        entity.lose("sigma")
-    return {"filter": {"triangle": "tent"}.get(entity.type, entity.type)}
+    radius, up = (entity.number(name, RADII[entity.type]) for name in ("xradius", "yradius"))
+    if up != radius:
+        entity.lose(f"yradius; {radius:g} in its place")
+    if entity.type == "gaussian":
+        return {"filter": GaussianFilter(radius, entity.number("sigma", 0.5), windowed=True)}
+    name, kind = ("box", BoxFilter) if entity.type == "box" else ("tent", TentFilter)
+    return {"filter": name if radius == kind.radius else kind(radius)}
 
 
 unsupported("filter", "mitchell sinc")
