@@ -1,8 +1,10 @@
 """glTF: geometry, nodes, materials, textures, lights and cameras, on small files written here."""
 
 import json
+import re
 import time
 import warnings
+from pathlib import Path
 from types import SimpleNamespace
 
 import imageio.v3 as iio
@@ -17,6 +19,7 @@ from wavefront.bsdfs import Dielectric, Diffuse, ThinDielectric
 from wavefront.codecs.encoding import srgb_to_linear
 from wavefront.core.errors import SceneError
 from wavefront.io import gltf_document, placing
+from wavefront.io.gltf_materials import KNOWN
 from wavefront.io.load import from_trimesh, load, load_mesh, load_meshes
 from wavefront.io.sources import LoadLimits
 from wavefront.lights import DirectionalLight, SpotLight
@@ -1420,3 +1423,10 @@ def base(mesh):
     """The base color of a mesh's material."""
     (key,) = vars(mesh.material.bsdf).keys() & {"base_color", "reflectance"}
     return getattr(mesh.material.bsdf, key)
+
+
+def test_the_documentation_lists_the_extensions():
+    page = (Path(__file__).parents[2] / "docs" / "formats.md").read_text("utf-8")
+    told = page.partition("These extensions are read: ")[2].partition(". ")[0]
+    names = {name.removeprefix("KHR_materials_") for name in KNOWN}
+    assert names == set(re.findall(r"\w+", told)) - {"and", "of", "the", "extensions", "KHR_materials_"}
