@@ -194,6 +194,124 @@ def test_textures(tmp_path: Path) -> None:
         load(tmp_path, PAINT % (text, IMAGE) + BOUND, strict=False)
 
 
+READERS = """def Shader "%s"
+    {
+        uniform token info:id = "UsdUVTexture"
+        asset inputs:file = @a.png@
+        float2 inputs:st.connect = </paint/%s.outputs:result>
+        float3 outputs:rgb
+        float outputs:r
+    }
+    def Shader "%s"
+    {
+        uniform token info:id = "UsdPrimvarReader_float2"
+        string inputs:varname = "%s"
+        float2 outputs:result
+    }
+    """
+
+
+def textured_board(folder: Path, *readers: tuple[str, str, str], extra: str = "") -> str:
+    """Return a mesh with `st` and a `UVMap` at each corner, with textures of (input, output, primvar)."""
+    write_image(folder / "a.png", np.linspace(0, 1, 48, dtype=np.float32).reshape(4, 4, 3))
+    inputs = [
+        f"{kind} inputs:{name}.connect = </paint/i{i}.outputs:{'rgb' if 'color' in kind else 'r'}>"
+        for i, (kind, name, _) in enumerate(readers)
+    ]
+    shaders = [READERS % (f"i{i}", f"r{i}", f"r{i}", each[2]) for i, each in enumerate(readers)]
+    map_ = "texCoord2f[] primvars:UVMap = [(0, 0.5), (0.25, 0), (1, 0.25), (0.75, 1)]"
+    board = BOUND.replace("    rel", f'    {map_} (interpolation = "faceVarying")\n{extra}    rel')
+    return PAINT % ("\n        ".join(inputs), "".join(shaders)) + board
+
+
+UV_MAP = [[0, 0.5], [0.25, 0], [1, 0.25], [0.75, 1]]
+
+
+def test_textures_use_the_primvar_that_is_read_for_them(tmp_path: Path) -> None:
+    """Blender calls its coordinates UVMap."""
+    base = ("color3f", "diffuseColor", "UVMap")
+    (mesh,) = load(tmp_path, textured_board(tmp_path, base)).shapes
+    assert mesh.uvs[mesh.faces].reshape(-1, 2).tolist() == [UV_MAP[i] for i in (0, 1, 2, 0, 2, 3)]
+    assert mesh.uvs1 is None
+    move = IMAGE.replace(
+        "float2 inputs:scale",
+        "float2 inputs:in.connect = </paint/r0.outputs:result>\n        float2 inputs:scale",
+    )
+    text = (
+        textured_board(tmp_path, base)
+        .replace("/paint/i0.", "/paint/image.")
+        .replace('def Shader "i0"', move + '\n    def Shader "i0"')
+    )
+    (moved,) = load(tmp_path, text).shapes
+    assert moved.uvs.tolist() == mesh.uvs.tolist()
+    np.testing.assert_allclose(moved.material.bsdf.base_color.transform[:2, 2], [0.25, 0.5])
+    image = wf.render(wf.Scene([moved], [wf.Environment(1)]), spp=1, size=(8, 8), progress=False)
+    assert np.isfinite(image.rgb).all()
+
+
+def test_a_second_primvar_is_the_second_set(tmp_path: Path) -> None:
+    readers = (
+        ("color3f", "diffuseColor", "UVMap"),
+        ("float", "roughness", "st"),
+        ("float", "metallic", "UVMap"),
+    )
+    (mesh,) = load(tmp_path, textured_board(tmp_path, *readers)).shapes
+    bsdf = mesh.material.bsdf
+    assert [each.uv_set for each in (bsdf.base_color, bsdf.roughness, bsdf.metallic)] == [0, 1, 0]
+    assert mesh.uvs[mesh.faces[0]].tolist() == UV_MAP[:3]
+    assert mesh.uvs1[mesh.faces[0]].tolist() == [[0, 0], [1, 0], [1, 1]]
+
+
+def test_the_first_coordinates_are_loaded_for_materials_without_textures(tmp_path: Path) -> None:
+    text = (
+        textured_board(tmp_path)
+        .replace("primvars:st", "primvars:other")
+        .replace("texCoord2f[] primvars:o", "float[] primvars:o")
+    )
+    text = text.replace("[(0, 0), (1, 0), (1, 1), (0, 1)]", "[0, 1, 2, 3]")
+    (mesh,) = load(tmp_path, text).shapes
+    assert mesh.uvs[mesh.faces[0]].tolist() == UV_MAP[:3]
+
+
+def test_primvars_that_are_missing_or_too_many_are_named(tmp_path: Path) -> None:
+    base = ("color3f", "diffuseColor", "uv")
+    with pytest.raises(wf.SceneError, match="/board primvars:uv, which is missing; zeros in its place"):
+        load(tmp_path, textured_board(tmp_path, base))
+    with pytest.warns(UserWarning, match="/board primvars:uv, which is missing"):
+        (mesh,) = load(tmp_path, textured_board(tmp_path, base), strict=False).shapes
+    assert not mesh.uvs.any()
+    three = [("float", name, name) for name in ("roughness", "metallic", "clearcoat")]
+    extra = "".join(
+        f'    texCoord2f[] primvars:{name} = [(0, 0)] (interpolation = "constant")\n' for _, name, _ in three
+    )
+    with pytest.raises(wf.SceneError, match=r"/paint/r2 the primvar 'clearcoat'"):
+        load(tmp_path, textured_board(tmp_path, *three, extra=extra))
+    with pytest.raises(wf.SceneError, match="/paint/r0 its varname, which is empty"):
+        load(tmp_path, textured_board(tmp_path, ("float", "roughness", "")))
+    narrow = '    float[] primvars:uv = [1, 2, 3, 4] (interpolation = "vertex")\n'
+    with pytest.raises(wf.SceneError, match="/board: uv must have rows of 2 numbers"):
+        load(tmp_path, textured_board(tmp_path, base, extra=narrow))
+    with pytest.raises(wf.SceneError, match="/paint/r0 the shader 'UsdPrimvarReader_int'"):
+        load(tmp_path, textured_board(tmp_path, base).replace("Reader_float2", "Reader_int"))
+
+
+def test_colors_are_those_of_the_primvar_that_is_read(tmp_path: Path) -> None:
+    reader = """def Shader "read"
+    {
+        uniform token info:id = "UsdPrimvarReader_float3"
+        string inputs:varname = "tint"
+        float3 outputs:result
+    }"""
+    extra = "".join(
+        f'    color3f[] primvars:{name} = [({value}, 0, 1)] (interpolation = "constant")\n'
+        for name, value in (("displayColor", 0), ("tint", 0.5))
+    )
+    paint = PAINT % ("color3f inputs:diffuseColor.connect = </paint/read.outputs:result>", reader)
+    (mesh,) = load(tmp_path, paint + BOUND.replace("    rel", f"{extra}    rel")).shapes
+    assert isinstance(mesh.material.bsdf.base_color, wf.VertexColors)
+    assert mesh.colors[0, :3].tolist() == [0.5, 0, 1]
+
+
 def test_instances_share_their_mesh(tmp_path: Path) -> None:
     copies = "".join(
         f"""def Xform "copy{i}" (instanceable = true
@@ -288,6 +406,140 @@ def DomeLight "sky"
     assert isinstance(sky, wf.Environment)
     (plain,) = load(tmp_path, body.replace("bool inputs:normalize = 1", "")).lights[:1]
     np.testing.assert_allclose(np.ravel(plain.irradiance), 5 * np.pi * np.sin(np.radians(0.5)) ** 2)
+
+
+PARTS = """    double radius = 2
+    double height = 6
+    double size = 4
+    double width = 3
+    double length = 5
+"""
+
+
+@pytest.mark.parametrize(
+    ("kind", "volume", "extent"),
+    [
+        ("Cube", 64, (4, 4, 4)),
+        ("Sphere", 32 / 3 * np.pi, (4, 4, 4)),
+        ("Cylinder", 24 * np.pi, (4, 4, 6)),
+        ("Cone", 8 * np.pi, (4, 4, 6)),
+        ("Capsule", (24 + 32 / 3) * np.pi, (4, 4, 10)),
+    ],
+)
+@pytest.mark.parametrize("axis", ["X", "Y", "Z"])
+def test_solids(tmp_path: Path, kind: str, volume: float, extent: Any, axis: str) -> None:
+    stretch = '    float3 xformOp:scale = (1, 1, 2)\n    uniform token[] xformOpOrder = ["xformOp:scale"]\n'
+    own = "" if kind in ("Cube", "Sphere") else f'    uniform token axis = "{axis}"\n'
+    body = f'def {kind} "solid"\n{{\n{PARTS}{own}{stretch}}}\n'
+    (mesh,) = load(tmp_path, body).shapes
+    size = np.roll(extent, "ZXY".index(axis)) if own else np.array(extent)
+    np.testing.assert_allclose(np.ptp(mesh.bounds, axis=0), size * (1, 1, 2), rtol=1e-3)
+    np.testing.assert_allclose(mesh.bounds.mean(0), 0, atol=1e-12)
+    a, b, c = mesh.vertices[mesh.faces].transpose(1, 0, 2)
+    inside = float((np.cross(a, b) * c).sum() / 6)  # above 0 where the fronts are outside
+    assert inside == pytest.approx(2 * volume, rel=2e-3)
+    if mesh.normals is not None:
+        ahead = (np.cross(b - a, c - a)[:, None] * mesh.normals[mesh.faces]).sum(2)
+        assert (ahead > 0).all()
+    assert mesh.name == "solid"
+
+
+def test_the_apex_of_a_cone_is_above(tmp_path: Path) -> None:
+    (mesh,) = load(tmp_path, f'def Cone "solid"\n{{\n{PARTS}    uniform token axis = "Y"\n}}\n').shapes
+    top = mesh.vertices[mesh.vertices[:, 1] > 2.99]
+    np.testing.assert_allclose(top, [[0, 3, 0]] * len(top), atol=1e-12)
+
+
+def test_planes(tmp_path: Path) -> None:
+    for axis, size, normal in (("Z", (3, 5, 0), 2), ("X", (0, 5, 3), 0), ("Y", (3, 0, 5), 1)):
+        (mesh,) = load(tmp_path, f'def Plane "p"\n{{\n{PARTS}    uniform token axis = "{axis}"\n}}\n').shapes
+        np.testing.assert_allclose(np.ptp(mesh.bounds, axis=0), size)
+        a, b, c = mesh.vertices[mesh.faces[0]]
+        assert np.cross(b - a, c - a)[normal] > 0
+
+
+def test_solids_show_their_color_or_material(tmp_path: Path) -> None:
+    color = "    color3f[] primvars:displayColor = [(0.25, 0.5, 0.75)]\n"
+    for kind in ("Sphere", "Cube"):
+        (shape,) = load(tmp_path, f'def {kind} "s"\n{{\n{color}}}\n').shapes
+        assert isinstance(shape, wf.Sphere) == (kind == "Sphere")
+        camera = wf.Camera.look_at((0, 0, 9), (0, 0, 0), fov=2, size=(2, 2))
+        scene = wf.Scene([shape], [wf.Environment(1)], camera=camera)
+        picture = wf.render(scene, 16, progress=False).rgb
+        np.testing.assert_allclose(picture.mean((0, 1)), [0.25, 0.5, 0.75], rtol=0.02)
+    bound = BOUND.replace("Mesh", "Cube").replace(TRIANGLE, "")
+    (cube,) = load(tmp_path, PAINT % ("float inputs:roughness = 0.25", "") + bound).shapes
+    assert float(np.ravel(cube.material.bsdf.roughness)[0]) == 0.25
+    with pytest.raises(wf.SceneError, match=r"/s: radius is 0\.0; it must be above 0"):
+        load(tmp_path, 'def Cylinder "s"\n{\n    double radius = 0\n}\n')
+
+
+def test_cylinder_lights_shine_from_their_sides(tmp_path: Path) -> None:
+    own = "    float inputs:intensity = 3\n    float inputs:radius = 0.5\n    float inputs:length = 4\n"
+    scale = '    float3 xformOp:scale = (2, 3, 3)\n    uniform token[] xformOpOrder = ["xformOp:scale"]\n'
+    for normalize, radiance in ((0, 3), (1, 3 / (2 * np.pi * 1.5 * 8))):
+        body = f'def CylinderLight "l"\n{{\n{own}{scale}    bool inputs:normalize = {normalize}\n}}\n'
+        _, tube = load(tmp_path, MESH + body, "metersPerUnit = 0.1").shapes
+        np.testing.assert_allclose(np.ravel(tube.emission), radiance, rtol=1e-5)
+        np.testing.assert_allclose(np.ptp(tube.bounds, axis=0), [0.8, 0.3, 0.3], rtol=1e-3)
+        a, b, c = tube.vertices[tube.faces].transpose(1, 0, 2)
+        normal = np.cross(b - a, c - a)
+        assert np.abs(normal[:, 0]).max() < 1e-12  # no ends
+        assert ((a + b + c) * normal).sum(1).min() > 0
+
+
+def test_the_specular_workflow(tmp_path: Path) -> None:
+    write_image(tmp_path / "a.png", np.full((4, 4, 3), 0.5, np.float32))
+    text = """int inputs:useSpecularWorkflow = 1
+        float inputs:metallic = 1
+        float inputs:ior = 1.2
+        color3f inputs:specularColor = (0.1, 0.2, 0.4)"""
+    (mesh,) = load(tmp_path, PAINT % (text, "") + BOUND).shapes
+    bsdf = mesh.material.bsdf
+    np.testing.assert_allclose(np.ravel(bsdf.specular_color) * 0.04, [0.1, 0.2, 0.4], rtol=1e-6)
+    np.testing.assert_allclose(np.ravel(bsdf.metallic), 0)
+    np.testing.assert_allclose(np.ravel(bsdf.ior), 1.5)
+    linked = text.replace(
+        "specularColor = (0.1, 0.2, 0.4)", "specularColor.connect = </paint/image.outputs:rgb>"
+    )
+    (mesh,) = load(tmp_path, PAINT % (linked, IMAGE) + BOUND).shapes
+    np.testing.assert_allclose(np.ravel(mesh.material.bsdf.specular_color.scale), 12.5, rtol=1e-6)
+    (mesh,) = load(tmp_path, PAINT % (text.replace("= 1\n", "= 0\n", 1), "") + BOUND).shapes
+    np.testing.assert_allclose(np.ravel(mesh.material.bsdf.specular_color), 1)
+    np.testing.assert_allclose(np.ravel(mesh.material.bsdf.metallic), 1)
+
+
+def test_orthographic_cameras(tmp_path: Path) -> None:
+    body = """def Camera "view"
+{
+    token projection = "orthographic"
+    float horizontalAperture = 60
+    float verticalAperture = 40
+    double3 xformOp:translate = (0, 0, 9)
+    uniform token[] xformOpOrder = ["xformOp:translate"]
+}
+"""
+    camera = load(tmp_path, MESH + body, "metersPerUnit = 0.5").camera
+    assert camera.size == (768, 512)
+    pixels, _ = camera.project([(1.5, 1, 0), (-1.5, -1, -7)])  # 6 by 4 units of half a meter
+    np.testing.assert_allclose(pixels, [[768, 0], [0, 512]], atol=1e-4)
+
+
+def test_instances_have_the_materials_that_are_bound_to_them(tmp_path: Path) -> None:
+    copies = "".join(
+        f"""def Xform "copy{i}" (instanceable = true
+    prepend references = </model>
+    prepend apiSchemas = ["MaterialBindingAPI"])
+{{
+    rel material:binding = </{name}>
+}}
+"""
+        for i, name in enumerate(("paint", "gloss", "paint"))
+    )
+    paints = PAINT % ("", "") + (PAINT % ("", "")).replace("paint", "gloss")
+    shapes = load(tmp_path, f'{paints}class Xform "model"\n{{\n{MESH}}}\n{copies}').shapes
+    assert [shape.material.name for shape in shapes] == ["paint", "gloss", "paint"]
+    assert shapes[0].mesh is shapes[2].mesh
 
 
 def test_cameras(tmp_path: Path) -> None:
@@ -387,7 +639,8 @@ def test_what_is_hidden_is_left_out(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("body", "message"),
     [
-        (f'def Cone "hat"\n{{\n}}\n{MESH}', "/hat a Cone; left out"),
+        (f'def BasisCurves "hair"\n{{\n}}\n{MESH}', "/hair a BasisCurves; left out"),
+        (MESH + 'def CylinderLight "l"\n{\n    bool treatAsLine = 1\n}\n', "/l treatAsLine"),
         (PAINT % ("float inputs:displacement = 1", "") + BOUND, "/paint/shader displacement"),
         (MESH + 'def SphereLight "l"\n{\n    float inputs:shaping:cone:angle = 9\n}\n', "/l its radius"),
         (

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Callable
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -16,6 +17,8 @@ from ...core.errors import SceneError
 from ...materials import Material
 from ...textures import NormalMap, Texture, VertexColors
 from ...textures.base import BaseTexture
+from ..gltf_specular_glossiness import F0
+from ..repair import RawMesh
 from ..sources import SceneFiles
 
 WRAPS = {"repeat": "repeat", "clamp": "clamp", "mirror": "mirror", "useMetadata": "repeat"}
@@ -26,116 +29,53 @@ NUMBERS = {  # theirs, ours and the default
     "clearcoat": ("clearcoat", 0.0),
     "clearcoatRoughness": ("clearcoat_roughness", 0.01),
 }
-IGNORED = ("displacement", "useSpecularWorkflow", "specularColor")  # where they are not their default
 CHANNELS = {"r": 0, "g": 1, "b": 2, "a": 3}
 COLORED = Material(Diffuse(VertexColors()))
+MOST_MOVES = 16  # transforms of texture coordinates one after the other
+# the fields of a mesh that primvars become, by their readers
+COORDINATES, COLORS = ("uvs", "uvs1"), ("colors",)
+
+
+@dataclass(eq=False)
+class Look:
+    """A material, the light that it emits, and the primvars that it reads, by the field of a mesh."""
+
+    material: Material | None = None
+    emission: Any = None
+    primvars: dict[str, str] = field(default_factory=dict)
+
+    def material_for(self, raw: RawMesh) -> Material | None:
+        """Return the material; that of the vertex colors where none is bound."""
+        return COLORED if self.material is None and raw.colors is not None else self.material
 
 
 class Materials:
-    """The materials of a stage, each converted once, with the light that they emit."""
+    """The materials of a stage, each converted once."""
 
     def __init__(self, files: SceneFiles, time: Any, lose: Callable[[Any, str], None]) -> None:
         self.files, self.time, self.lose = files, time, lose
-        self._made: dict[str, tuple[Material, Any]] = {}
+        self._none = Look()
+        self._made: dict[str, Look] = {}
         self._images: dict[str, Any] = {}
 
-    def of(self, prim: Any) -> tuple[Material | None, Any]:
-        """Return the material bound to a prim, None if there is none, and its emission."""
+    def of(self, prim: Any) -> Look:
+        """Return the look of a prim; without a bound material it has none of its own."""
         from pxr import UsdShade
 
         bound = UsdShade.MaterialBindingAPI(prim).ComputeBoundMaterial()[0]
         if not bound:
-            return None, None
+            return self._none
         key = str(bound.GetPath())
         if key not in self._made:
             self._made[key] = self._converted(bound)
         return self._made[key]
 
-    def _converted(self, bound: Any) -> tuple[Material, Any]:
+    def _converted(self, bound: Any) -> Look:
         shader, *_ = bound.ComputeSurfaceSource()
-        if not shader or shader.GetIdAttr().Get() != "UsdPreviewSurface":
-            self.lose(bound.GetPrim(), "its surface shader; a gray Diffuse in its place")
-            return Material(Diffuse(0.5), name=bound.GetPrim().GetName()), None
-        for name in IGNORED:
-            if self._value(shader, name, 0, color=name == "specularColor") not in (0, (0.0, 0.0, 0.0)):
-                self.lose(shader.GetPrim(), name)
-        numbers = {ours: self._value(shader, name, default) for name, (ours, default) in NUMBERS.items()}
-        base = self._value(shader, "diffuseColor", (0.18, 0.18, 0.18), color=True)
-        opacity, cut = self._value(shader, "opacity", 1.0), self._value(shader, "opacityThreshold", 0.0)
-        normal = self._value(shader, "normal", None, color=True, normal=True)
-        glow = self._value(shader, "emissiveColor", (0.0, 0.0, 0.0), color=True)
-        material = Material(
-            Principled(base, **numbers),
-            alpha=None if isinstance(opacity, float) and opacity >= 1 else opacity,
-            alpha_cutoff=float(cut) if isinstance(cut, float) and cut > 0 else None,
-            normal_map=NormalMap(normal) if isinstance(normal, Texture) else None,
-            name=bound.GetPrim().GetName(),
-        )
-        return material, glow if isinstance(glow, BaseTexture) or any(glow) else None
-
-    def _value(self, shader: Any, name: str, default: Any, color: bool = False, normal: bool = False) -> Any:
-        """Return an input: a float, a color as a tuple, or a texture."""
-        sources = _sources(shader, name)
-        if not sources:
-            return default
-        from pxr import UsdShade
-
-        source = UsdShade.Shader(sources[0].GetPrim())
-        if UsdShade.Output.IsOutput(sources[0]) and source:
-            return self._texture(source, sources[0].GetBaseName(), default, color, normal)
-        value = sources[0].Get(self.time)
-        if value is None:
-            return default
-        return tuple(float(part) for part in value) if color else float(value)
-
-    def _texture(self, source: Any, output: str, default: Any, color: bool, normal: bool) -> Any:
-        kind = str(source.GetIdAttr().Get() or "")
-        if kind.startswith("UsdPrimvarReader_float3") and color:
-            return VertexColors()
-        path = self._get(source, "file")
-        if kind != "UsdUVTexture" or path is None:
-            self.lose(source.GetPrim(), f"the shader {kind!r}" if kind != "UsdUVTexture" else "file")
-            return default
-        pixels = self.pixels(source.GetPrim(), path)
-        if pixels is None:
-            return default
-        scale, bias = self._get(source, "scale", (1, 1, 1, 1)), self._get(source, "bias", (0, 0, 0, 0))
-        space = self._get(source, "sourceColorSpace", "auto")
-        wraps = [str(self._get(source, name, "useMetadata")) for name in ("wrapS", "wrapT")]
-        for wrap in set(wraps) - WRAPS.keys():
-            self.lose(source.GetPrim(), f"wrap {wrap!r}; 'clamp' in its place")
-        channel = None if color else CHANNELS.get(output, 0)
-        part = slice(0, 3) if color else channel
-        return Texture(
-            pixels,
-            srgb=not normal and (space == "sRGB" or (space == "auto" and color)),
-            wrap=tuple(WRAPS.get(wrap, "clamp") for wrap in wraps),  # type: ignore[arg-type]
-            transform=self._transform(source),
-            channel=channel,
-            scale=1.0 if normal else np.asarray(scale, float)[part],
-            offset=0.0 if normal else np.asarray(bias, float)[part],
-        )
-
-    def _get(self, source: Any, name: str, default: Any = None) -> Any:
-        sources = _sources(source, name)
-        value = sources[0].Get(self.time) if sources else None
-        return default if value is None else value
-
-    def _transform(self, source: Any) -> Any:
-        """Return the matrix (3, 3) of a UsdTransform2d of texture coordinates, if there is one."""
-        from pxr import UsdShade
-
-        sources = _sources(source, "st")
-        reader = UsdShade.Shader(sources[0].GetPrim()) if sources else None
-        if not reader or reader.GetIdAttr().Get() != "UsdTransform2d":
-            return None
-        turns = np.array(float(self._get(reader, "rotation", 0.0)) / 360)
-        sin, cos = sin_cos_turns(turns)
-        turn = np.array([[cos, -sin], [sin, cos]])
-        out = np.eye(3)
-        out[:2, :2] = turn * np.asarray(self._get(reader, "scale", (1, 1)), float)
-        out[:2, 2] = np.asarray(self._get(reader, "translation", (0, 0)), float)
-        return out
+        if shader and shader.GetIdAttr().Get() == "UsdPreviewSurface":
+            return _Surface(self, shader).look(bound.GetPrim().GetName())
+        self.lose(bound.GetPrim(), "its surface shader; a gray Diffuse in its place")
+        return Look(Material(Diffuse(0.5), name=bound.GetPrim().GetName()))
 
     def pixels(self, prim: Any, file: Any) -> Any:
         """Return the values of an image, which may be in a usdz archive, or None if it is missing."""
@@ -161,6 +101,141 @@ class Materials:
         folder = Path(self.files.name).resolve().parent
         path = self.files.find(os.path.relpath(name, folder) if os.path.isabs(name) else name)
         return self.files.image(path) if path.exists() else None
+
+
+class _Surface:
+    """A UsdPreviewSurface, and the primvars that its textures read."""
+
+    def __init__(self, materials: Materials, shader: Any) -> None:
+        self.materials, self.shader = materials, shader
+        self.time, self.lose = materials.time, materials.lose
+        self.primvars: dict[str, str] = {}
+
+    def look(self, name: str) -> Look:
+        """Return the material, which gets a name."""
+        if self._value("displacement", 0.0) != 0:
+            self.lose(self.shader.GetPrim(), "displacement")
+        numbers = {ours: self._value(theirs, default) for theirs, (ours, default) in NUMBERS.items()}
+        if self._value("useSpecularWorkflow", 0.0) == 1:
+            tint = self._value("specularColor", (0.0, 0.0, 0.0), color=True, times=1 / F0)
+            numbers |= {"metallic": 0.0, "ior": 1.5, "specular_color": tint}
+        base = self._value("diffuseColor", (0.18, 0.18, 0.18), color=True)
+        opacity, cut = self._value("opacity", 1.0), self._value("opacityThreshold", 0.0)
+        normal = self._value("normal", None, color=True, normal=True)
+        glow = self._value("emissiveColor", (0.0, 0.0, 0.0), color=True)
+        material = Material(
+            Principled(base, **numbers),
+            alpha=None if isinstance(opacity, float) and opacity >= 1 else opacity,
+            alpha_cutoff=float(cut) if isinstance(cut, float) and cut > 0 else None,
+            normal_map=NormalMap(normal) if isinstance(normal, Texture) else None,
+            name=name,
+        )
+        emission = glow if isinstance(glow, BaseTexture) or any(glow) else None
+        return Look(material, emission, self.primvars)
+
+    def _value(
+        self, name: str, default: Any, color: bool = False, normal: bool = False, times: float = 1.0
+    ) -> Any:
+        """Return an input, times a factor: a float, a color as a tuple, or a texture."""
+        sources = _sources(self.shader, name)
+        if not sources:
+            return default
+        from pxr import UsdShade
+
+        source = UsdShade.Shader(sources[0].GetPrim())
+        if UsdShade.Output.IsOutput(sources[0]) and source:
+            return self._texture(source, sources[0].GetBaseName(), default, color, normal, times)
+        value = sources[0].Get(self.time)
+        if value is None:
+            return default
+        return tuple(float(part) * times for part in value) if color else float(value) * times
+
+    def _texture(
+        self, source: Any, output: str, default: Any, color: bool, normal: bool, times: float
+    ) -> Any:
+        kind = _kind(source)
+        if kind.startswith("UsdPrimvarReader_float3") and color:
+            return default if self._primvar(source, COLORS) is None else VertexColors()
+        path = self._get(source, "file")
+        if kind != "UsdUVTexture" or path is None:
+            self.lose(source.GetPrim(), f"the shader {kind!r}" if kind != "UsdUVTexture" else "file")
+            return default
+        pixels = self.materials.pixels(source.GetPrim(), path)
+        if pixels is None:
+            return default
+        scale, bias = self._get(source, "scale", (1, 1, 1, 1)), self._get(source, "bias", (0, 0, 0, 0))
+        space = self._get(source, "sourceColorSpace", "auto")
+        wraps = [str(self._get(source, name, "useMetadata")) for name in ("wrapS", "wrapT")]
+        for wrap in set(wraps) - WRAPS.keys():
+            self.lose(source.GetPrim(), f"wrap {wrap!r}; 'clamp' in its place")
+        channel = None if color else CHANNELS.get(output, 0)
+        part = slice(0, 3) if color else channel
+        transform, field = self._coordinates(source)
+        return Texture(
+            pixels,
+            srgb=not normal and (space == "sRGB" or (space == "auto" and color)),
+            wrap=tuple(WRAPS.get(wrap, "clamp") for wrap in wraps),  # type: ignore[arg-type]
+            transform=transform,
+            channel=channel,
+            scale=1.0 if normal else np.asarray(scale, float)[part] * times,
+            offset=0.0 if normal else np.asarray(bias, float)[part] * times,
+            uv_set=COORDINATES.index(field),  # type: ignore[arg-type]
+        )
+
+    def _get(self, source: Any, name: str, default: Any = None) -> Any:
+        sources = _sources(source, name)
+        value = sources[0].Get(self.time) if sources else None
+        return default if value is None else value
+
+    def _coordinates(self, texture: Any) -> tuple[Any, str]:
+        """Return the matrix (3, 3) of a texture's coordinates, None for none, and their field of a mesh."""
+        matrix, reader = None, _shader_of(texture, "st")
+        for _ in range(MOST_MOVES):
+            if reader is None or _kind(reader) != "UsdTransform2d":
+                break
+            move = self._move(reader)
+            matrix, reader = move if matrix is None else matrix @ move, _shader_of(reader, "in")
+        if reader is None:
+            return matrix, self._field("st", COORDINATES) or "uvs"
+        if _kind(reader) != "UsdPrimvarReader_float2":
+            self.lose(reader.GetPrim(), f"the shader {_kind(reader)!r}; the first texture coordinates")
+            return matrix, "uvs"
+        return matrix, self._primvar(reader, COORDINATES) or "uvs"
+
+    def _move(self, shader: Any) -> Any:
+        """Return the matrix (3, 3) of a UsdTransform2d."""
+        sin, cos = sin_cos_turns(np.array(float(self._get(shader, "rotation", 0.0)) / 360))
+        turn = np.array([[cos, -sin], [sin, cos]])
+        out = np.eye(3)
+        out[:2, :2] = turn * np.asarray(self._get(shader, "scale", (1, 1)), float)
+        out[:2, 2] = np.asarray(self._get(shader, "translation", (0, 0)), float)
+        return out
+
+    def _primvar(self, reader: Any, fields: tuple[str, ...]) -> str | None:
+        """Return the field of a mesh that a primvar becomes, which a shader reads; None if all are taken."""
+        name = str(self._get(reader, "varname", ""))
+        found = self._field(name, fields) if name else None
+        if not name:
+            self.lose(reader.GetPrim(), "its varname, which is empty")
+        elif found is None:
+            self.lose(reader.GetPrim(), f"the primvar {name!r}, as there are {len(fields)} before it")
+        return found
+
+    def _field(self, name: str, fields: tuple[str, ...]) -> str | None:
+        return next((each for each in fields if self.primvars.setdefault(each, name) == name), None)
+
+
+def _kind(shader: Any) -> str:
+    return str(shader.GetIdAttr().Get() or "")
+
+
+def _shader_of(shader: Any, name: str) -> Any:
+    """Return the shader that an input is connected to, None if it is to none."""
+    from pxr import UsdShade
+
+    sources = _sources(shader, name)
+    found = UsdShade.Shader(sources[0].GetPrim()) if sources else None
+    return found if found and UsdShade.Output.IsOutput(sources[0]) else None
 
 
 def _sources(shader: Any, name: str) -> Any:
