@@ -519,7 +519,7 @@ BAD = [
     ((TRIANGLE, PROJECTIVE), r"tri: transform has the last row \[0.0, 0.0, 0.5, 1.0\]; it must be"),
     ((TRIANGLE, np.diag([1e39] * 3 + [1])), r"tri: vertices\[1\]\[0\] is 1e\+39; its size must be at most"),
     (("ball", np.eye(4)), r"instance: mesh must be a wf.Mesh, got 'ball'"),
-    ((wf.Sphere((0, 0, 0), 1), np.eye(4)), r"mesh must be a wf.Mesh, got <Sphere.*placed\(\) makes copies"),
+    ((wf.Sphere((0, 0, 0), 1), np.eye(4)), r"mesh must be a wf.Mesh, got <Sphere.*wf.Group\(...\).placed"),
 ]  # fmt: skip
 
 

@@ -35,7 +35,7 @@ INSTEAD: dict[str, tuple[Any, str]] = {
 }
 NUMBERS, VECTORS = ("float", "integer"), ("point3", "vector3", "point", "vector")
 P = TypeVar("P", bound="Part")
-T = TypeVar("T", bound=BaseTexture)
+T = TypeVar("T")
 
 
 class PlacedError(SceneError):
@@ -183,6 +183,13 @@ class Conversion(Generic[P]):
         """Refuse triangles that are too many with those before."""
         self.triangles += len(faces)
         self.files.limits.check_triangles(self.name, self.triangles)
+
+    def count_instances(self, count: int) -> None:
+        """Refuse instances that are too many with those before."""
+        self.instances += count
+        most = self.files.limits.instances
+        if self.instances > most:
+            raise SceneError(f"there are more than {most} instances; the limit is LoadLimits.instances")
 
 
 def textures_in(thing: Any, kind: type[T] = BaseTexture) -> list[T]:  # type: ignore[assignment]

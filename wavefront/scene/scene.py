@@ -20,7 +20,7 @@ from ..core.plural import plural
 from ..core.suggestions import did_you_mean, suggests_keywords
 from ..lights import Environment, Light
 from ..media import BaseMedium
-from ..shapes import Instance, Mesh, PrimitiveArray, Shape
+from ..shapes import Group, Instance, Mesh, PrimitiveArray, Shape
 from ..shapes.instance import instance_bounds, instance_hulls
 from .html import scene_html
 
@@ -47,9 +47,9 @@ class Scene:
     Parameters
     ----------
     shapes
-        `Mesh`, `Sphere`, `Spheres`, `Cylinders`, `Capsules`, `SignedDistanceGrid` and `Instance` objects, and
-        what functions such as `Rectangle` return; shapes with an emission are lights. Objects of trimesh are
-        converted.
+        `Mesh`, `Sphere`, `Spheres`, `Cylinders`, `Capsules`, `SignedDistanceGrid`, `Instance` and `Group`
+        objects, and what functions such as `Rectangle` return; shapes with an emission are lights. Objects of
+        trimesh are converted.
     lights
         `PointLight`, `SpotLight`, `DirectionalLight` and `Environment` objects, or any `Light`; at most one
         `Environment`. A scene without light is lit as in a studio: see `render`.
@@ -397,13 +397,13 @@ class Shapes(CheckedList[Shape]):
     name = "shapes"
     allowed = (
         "wf.Mesh, wf.Rectangle, wf.Disk, wf.Sphere, wf.Spheres, wf.Cylinders, wf.Capsules, "
-        "wf.SignedDistanceGrid, wf.Instance, or a mesh or scene of trimesh"
+        "wf.SignedDistanceGrid, wf.Instance, wf.Group, or a mesh or scene of trimesh"
     )
 
     def converted(self, item: Any) -> list[Shape] | None:
-        """Return a shape, or those of an object of another package."""
-        if isinstance(item, Shape):
-            return [item]
+        """Return a shape, or those of a group or of an object of another package."""
+        if isinstance(item, Shape | Group):
+            return list(item) if isinstance(item, Group) else [item]
         convert = importer(item)
         return None if convert is None else convert(item).shapes
 

@@ -5,6 +5,7 @@ from .base import CurvedShape, Shape
 from .box import Box, GridBox, Plane
 from .disk import Disk
 from .distance_grid import SignedDistanceGrid
+from .group import Group
 from .height_field import HeightField
 from .instance import Instance
 from .mesh import Mesh, Rectangle
@@ -21,6 +22,7 @@ __all__ = [
     "Disk",
     "Edges",
     "GridBox",
+    "Group",
     "HeightField",
     "Instance",
     "Mesh",

@@ -10,11 +10,11 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ..arrays.vec import FLOAT32_MAX, Bools, Doubles
-from ..core.errors import SceneError, finite_array
+from ..core.errors import SceneError, finite_array, in_brief
 from ..core.suggestions import suggests_keywords
 from ..materials import Material, MaterialLike, as_material
 from ..textures.base import BaseTexture
-from .base import Checked, CurvedShape, Shape
+from .base import Checked, Shape
 from .mesh import Mesh, check_range
 from .transform import moved, moved_tangents
 
@@ -41,7 +41,8 @@ def _invertible(name: str, value: ArrayLike) -> Doubles:
 class Instance(Shape):
     """A mesh placed by an affine transform: moved, rotated, scaled, mirrored or sheared.
 
-    For many instances of one mesh, its arrays are stored once and its tree is built once.
+    For many instances of one mesh, its arrays are stored once and its tree is built once. A `Group` places
+    several shapes together, also curved ones.
 
     Parameters
     ----------
@@ -80,9 +81,9 @@ class Instance(Shape):
         name: str | None = None,
     ) -> None:
         if not isinstance(mesh, Mesh):
-            curved = isinstance(mesh, CurvedShape)
-            hint = "; its method placed() makes copies by matrices" if curved else ""
-            raise SceneError(f"{name or 'instance'}: mesh must be a wf.Mesh, got {mesh!r}{hint}")
+            several = isinstance(mesh, list | tuple | Shape)
+            hint = "; wf.Group(...).placed(matrices) places shapes of all kinds" if several else ""
+            raise SceneError(f"{name or 'instance'}: mesh must be a wf.Mesh, got {in_brief(mesh)}{hint}")
         self.name = mesh.name if name is None else name
         self.mesh = mesh
         self.transform = transform

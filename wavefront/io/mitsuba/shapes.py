@@ -14,7 +14,7 @@ from ...arrays.vec import Doubles
 from ...bsdfs import Diffuse, Sides
 from ...core.errors import SceneError, as_array
 from ...materials import Material
-from ...shapes import CurvedShape, Cylinders, Instance, Mesh, Shape, SignedDistanceGrid, Sphere
+from ...shapes import Cylinders, Group, Shape, SignedDistanceGrid, Sphere
 from ...shapes.transform import Matrix
 from ...textures.image import Texture
 from ..conversion import textures_in
@@ -175,19 +175,9 @@ def _instance(node: Node, job: Job) -> list[Shape]:
     group, matrix = job.only(node, "shape"), node.matrix()
     if group.plugin != "shapegroup":
         raise SceneError(f"holds a {group.plugin}; it must be a shapegroup")
-    placed: list[Shape] = []
-    for shape in job.convert(group):
-        job.instances += 1
-        most = job.files.limits.instances
-        if job.instances > most:
-            raise SceneError(f"makes more than {most} instances; the limit is LoadLimits.instances")
-        if isinstance(shape, Mesh):
-            placed.append(Instance(shape, matrix, name=node.id or None))
-        elif isinstance(shape, CurvedShape):
-            placed.append(shape.transformed(matrix))
-        else:
-            raise SceneError("its group holds an instance; instances of instances are not supported")
-    return placed
+    shapes = Group(job.convert(group))
+    job.count_instances(len(shapes))
+    return list(shapes.placed(matrix, name=node.id or None))
 
 
 unsupported("blender bsplinecurve linearcurve ellipsoids ellipsoidsmesh", "shape")
