@@ -17,6 +17,7 @@ from wavefront.arrays.vec import luminance
 from wavefront.codecs.images import write_image
 from wavefront.io.pbrt.entities import TABLE
 from wavefront.io.pbrt.lights import sphere_to_square, square_to_sphere
+from wavefront.io.pbrt.noise import noise
 from wavefront.io.spectra import METALS
 
 BALL = 'Shape "sphere"\n'
@@ -92,6 +93,30 @@ def test_cameras_see_points_where_pbrt_does(
     pixels, _ = scene.camera.project(scene.shapes[0].vertices)
     expected = [raster(p, matrix, fov, window, size) for p in ((0.3, 0.2, -0.1), (1.3, 0.2, -0.1))]
     np.testing.assert_allclose(pixels[:2], expected, atol=1e-3)
+
+
+@pytest.mark.parametrize("mirror", [False, True])
+def test_spherical_cameras_see_points_where_pbrt_does(tmp_path: Path, mirror: bool) -> None:
+    """θ = πv is the angle from y, and φ = 2πu turns from x to z, in SphericalCamera::GenerateRay."""
+    header = f"{'Scale -1 1 1' if mirror else ''} {STATED}".replace("Transform", "ConcatTransform")
+    header += ' Camera "spherical" "string mapping" "equirectangular" Film "rgb" '
+    header += '"integer xresolution" 80 "integer yresolution" 40'
+    scene = load(tmp_path, "Translate .3 .2 -.1 " + SQUARE, header)
+    x, y, z, _ = (
+        np.diag([-1 if mirror else 1, 1, 1, 1])
+        @ TURN
+        @ np.array([[0.3, 1.3], [0.2, 0.2], [-0.1, -0.1], [1, 1]])
+    )
+    phi = np.arctan2(z, x) % (2 * np.pi)
+    theta = np.arccos(y / np.sqrt(x * x + y * y + z * z))
+    assert scene.camera is not None
+    pixels, _ = scene.camera.project(scene.shapes[0].vertices)
+    np.testing.assert_allclose(
+        pixels[:2], np.stack([phi / (2 * np.pi) * 80, theta / np.pi * 40], 1), atol=1e-4
+    )
+    equal = header.replace('"string mapping" "equirectangular"', "")
+    with pytest.raises(wf.SceneError, match="mapping 'equalarea'; 'equirectangular' in its place"):
+        load(tmp_path, SQUARE, equal)
 
 
 def test_a_lens_has_pbrts_radius_and_distance(tmp_path: Path) -> None:
@@ -203,8 +228,9 @@ def test_light_of_a_spectrum_has_luminance_1(tmp_path: Path, given: str) -> None
 
 def test_a_spot_that_falls_off_keeps_its_power(tmp_path: Path) -> None:
     text = 'LightSource "spot" "float power" 2 "float coneangle" 50 "float conedeltaangle" 20'
-    with pytest.warns(UserWarning, match="light 'spot': the form of its falloff"):
-        (spot,) = load(tmp_path, f"{text} {BALL}", strict=False).lights
+    spot = light(tmp_path, text)
+    assert (spot.angle, spot.falloff) == (100, "smoothstep")
+    assert spot.blend == pytest.approx(0.4)
     assert spot.record(np.zeros(3)).power(1)[0] == pytest.approx(2, rel=1e-4)
 
 
@@ -229,6 +255,28 @@ def test_area_lights_show_images(tmp_path: Path) -> None:
     found = shape(tmp_path, f'AreaLightSource "diffuse" "string filename" "a.exr" "float scale" 3 {SQUARE}')
     assert at(found.emission, 0.5, 0.9).tolist() == [12, 0, 0]
     assert found.uvs is not None
+
+
+@pytest.mark.parametrize("header", ["", 'Camera "perspective"'])  # a camera without Scale -1 1 1 mirrors
+def test_goniometric_lights_shine_as_their_image_says(tmp_path: Path, header: str) -> None:
+    size = 64
+    u, v = np.meshgrid(*2 * [(np.arange(size) + 0.5) / size])
+    image = (square_to_sphere(u, v)[..., None] * [[[[0.3]]], [[[0.2]]], [[[0.1]]]]).sum(0) + 0.5
+    write_image(tmp_path / "e.exr", np.repeat(image, 3, 2).astype(np.float32))
+    statement = 'LightSource "goniometric" "string filename" "e.exr" "rgb I" [ 1 2 3 ]'
+    found = light(tmp_path, f"Translate 1 2 3 Rotate 90 1 0 0 {statement}", header)
+    x, y, z = world = square_to_sphere(*np.random.default_rng(2).random((2, 500)))
+    points = np.stack([-1 - x if header else 1 + x, 2 + y, 3 + z])
+    seen = found.record(np.zeros(3)).sample_li(points.astype(np.float32), np.zeros((2, 500), np.float32))
+    # the light's x, y and z are the world's x, z and -y, and those of the image x, z and y of the light
+    expected = 0.5 + 0.3 * world[0] + 0.2 * -world[1] + 0.1 * world[2]
+    np.testing.assert_allclose(seen.radiance, np.outer([1, 2, 3], expected), atol=0.02)
+    np.testing.assert_allclose(seen.wi, -world * [[-1 if header else 1], [1], [1]], atol=1e-5)
+    bright = light(tmp_path, statement.partition('"rgb')[0] + '"float power" 8').record(np.zeros(3))
+    assert bright.power(1)[0] == pytest.approx(8, rel=1e-3)
+    write_image(tmp_path / "e.exr", np.ones((2, 3, 3), np.float32))
+    with pytest.raises(wf.SceneError, match="3 × 2 pixels; it must be square"):
+        light(tmp_path, statement)
 
 
 def test_the_square_of_directions_is_that_of_pbrt() -> None:
@@ -594,6 +642,128 @@ def test_no_point_changes_the_texture_of_another(tmp_path: Path, count: int) -> 
         np.testing.assert_array_equal(texture.at(SimpleNamespace(uv=uv)).T, alone)
 
 
+BILERP = 'Texture "t" "%s" "bilerp" "float uscale" 2 %s '
+
+
+def test_bilerp_goes_on_beyond_its_corners(tmp_path: Path) -> None:
+    corners = " ".join(
+        f'"rgb v{i}{j}" [ {i * 0.2 + j * 0.1} {i * j * 0.5} .25 ]' for i in (0, 1) for j in (0, 1)
+    )
+    paint = 'Material "diffuse" "texture reflectance" "t"'
+    found = material(tmp_path, BILERP % ("spectrum", corners) + paint).bsdf.reflectance
+    for u, v in ((0, 0), (0.25, 0.75), (0.75, 0.5)):
+        s, t = 2 * u, v
+        np.testing.assert_allclose(at(found, u, v), [0.2 * s + 0.1 * t, 0.5 * s * t, 0.25], atol=1e-6)
+    numbers = 'Material "conductor" "texture roughness" "t" "bool remaproughness" false'
+    rough = material(
+        tmp_path,
+        BILERP % ("float", '"float v00" .04 "float v01" .04 "float v10" .36 "float v11" .36') + numbers,
+    )
+    assert at(rough.bsdf.roughness, 0.25, 0.5) == pytest.approx(np.sqrt(0.2))
+
+
+DOTS = ["0000000", "1111101", "1111001", "0110111", "1111111", "1011101", "1000001"]
+NOISE = [
+    (0.25, 0.75, 0.13346624),
+    (3.1, 2.6, 0.44213372),
+    (-1.7, 4.2, -0.21442018),
+    (100.3, -250.9, 0.11975842),
+    (255.5, 256.5, -0.25),
+    (0, 0, 0.5),
+    (12345.25, 7.125, -0.09104389),
+]
+
+
+def test_dots_are_those_of_pbrt(tmp_path: Path) -> None:
+    text = """Texture "t" "spectrum" "dots" "rgb inside" [ .5 .25 0 ] "rgb outside" [ 0 0 .75 ]
+    "float uscale" 8 "float vscale" 8 Material "diffuse" "texture reflectance" "t" """
+    texture = material(tmp_path, text).bsdf.reflectance
+    u, v = np.meshgrid(*2 * [(np.arange(400, dtype=np.float32) + 0.5) / 400])
+    red, green, blue = texture.at(SimpleNamespace(uv=np.stack([u.ravel(), v.ravel()])))
+    inside = (red > 0.2).reshape(400, 400)
+    assert set(np.unique(np.stack([red, green, blue], 1), axis=0).ravel().tolist()) == {0, 0.25, 0.5, 0.75}
+    cells = inside[25:375, 25:375].reshape(7, 50, 7, 50).mean((1, 3))  # whole cells around 1, 2, ... 7
+    assert ((cells == 0) | (np.abs(cells - np.pi * 0.35**2) < 0.01)).all()
+    # of Noise(x + 0.5, y + 0.5) of pbrt-v4, compiled: the rows are y from 1 on
+    assert ["".join("01"[int(cell > 0)] for cell in row) for row in cells] == DOTS
+
+
+def test_the_noise_is_that_of_pbrt() -> None:
+    """Values of Noise(x, y) of pbrt-v4, compiled."""
+    x, y, expected = np.array(NOISE, np.float32).T
+    np.testing.assert_allclose(noise(x, y), expected, atol=2e-6)
+
+
+def test_a_direction_mixes_textures(tmp_path: Path) -> None:
+    text = """Rotate 90 1 0 0 Texture "t" "spectrum" "directionmix" "rgb tex1" [ 1 0 0 ] "rgb tex2" [ 0 1 0 ]
+    "vector3 dir" [ 0 2 0 ] Rotate -90 1 0 0 Material "diffuse" "texture reflectance" "t" """
+    texture = material(tmp_path, text).bsdf.reflectance  # along the world's z
+    normals = np.array([[0, 0, 1], [0, 0, -1], [1, 0, 0], [0, 0.6, 0.8]], np.float32).T
+    found = texture.at(SimpleNamespace(ng=normals)).T
+    np.testing.assert_allclose(found, [[1, 0, 0], [1, 0, 0], [0, 1, 0], [0.8, 0.2, 0]], atol=1e-6)
+
+
+MAPPED = """Translate 1 0 0 Texture "t" "spectrum" "imagemap" "string filename" "i.exr" "string mapping" "%s"
+    %s Translate -1 0 0 Material "diffuse" "texture reflectance" "t" """
+
+
+@pytest.mark.parametrize("header", ["", 'Camera "perspective"'])
+@pytest.mark.parametrize("kind", ["planar", "cylindrical", "spherical"])
+def test_mappings_by_the_place(tmp_path: Path, kind: str, header: str) -> None:
+    """Of points relative to (1, 0, 0), where the texture was stated."""
+    write_image(tmp_path / "i.exr", np.full((2, 2, 3), 0.5, np.float32))
+    more = '"vector3 v1" [ 0 2 0 ] "vector3 v2" [ 1 0 1 ] "float udelta" 3 "float vdelta" 4' * (
+        kind == "planar"
+    )
+    ball = 'Translate 1.5 .25 0 Shape "sphere" "float radius" 2'  # the axis is inside of it
+    (mesh,) = load(tmp_path, MAPPED % (kind, more) + ball, header).shapes
+    texture = mesh.material.bsdf.reflectance
+    assert texture.uv_set == 1
+    assert mesh.uvs is not None
+    x, y, z = (mesh.vertices * (-1 if header else 1, 1, 1) - (1, 0, 0)).T
+    turn = np.arctan2(y, x) / (2 * np.pi)
+    if kind == "planar":
+        expected = np.stack([2 * y + 3, x + z + 4], 1)
+    elif kind == "cylindrical":
+        expected = np.stack([turn + 0.5, z], 1)
+    else:
+        expected = np.stack([np.arccos(z / np.sqrt(x * x + y * y + z * z)) / np.pi, turn % 1], 1)
+    off = mesh.uvs1 - expected
+    np.testing.assert_allclose(off, np.rint(off) * (kind != "planar"), atol=1e-9)
+    spread = np.ptp(mesh.uvs1[mesh.faces], axis=1)
+    if kind != "planar":  # none but the two triangles around the axis spans the texture where its ends meet
+        assert (spread[:, 0 if kind == "cylindrical" else 1] > 0.5).sum() <= 2
+        assert np.rint(off).any()
+
+
+def test_corners_on_the_axis_get_the_turn_of_the_others(tmp_path: Path) -> None:
+    write_image(tmp_path / "i.exr", np.full((2, 2, 3), 0.5, np.float32))
+    fan = 'Shape "trianglemesh" "point3 P" [ 1 0 0 2 0 0 1 1 0 ]'
+    for order, at_axis in (("0 1 2", 0), ("1 2 0", 2)):
+        mesh = shape(tmp_path, MAPPED % ("cylindrical", "") + f'{fan} "integer indices" [ {order} ]')
+        turns = mesh.uvs1[mesh.faces[0], 0]
+        np.testing.assert_allclose(np.sort(turns), [0.5, 0.625, 0.75])
+        assert turns[at_axis] == pytest.approx(0.625)
+
+
+def test_mappings_beside_others_and_in_objects(tmp_path: Path) -> None:
+    write_image(tmp_path / "i.exr", np.full((2, 2, 3), 0.5, np.float32))
+    one = MAPPED % ("spherical", "")
+    two = one.replace('"t"', '"s"', 1).replace("spherical", "planar")
+    both = f"""{two} {one} Texture "p" "spectrum" "scale" "texture tex" "t" "float scale" .5
+    Texture "m" "spectrum" "mix" "texture tex1" "p" "texture tex2" "s"
+    Material "diffuse" "texture reflectance" "m" """
+    with pytest.raises(wf.SceneError, match="a second mapping by the place; the first one in its place"):
+        shape(tmp_path, both + SQUARE)
+    with pytest.raises(wf.SceneError, match="where its instances are"):
+        load(tmp_path, f'{one} ObjectBegin "o" {SQUARE} ObjectEnd ObjectInstance "o"')
+    flat = one.replace('"string mapping"', '"string other"')
+    with pytest.raises(wf.SceneError, match="other"):
+        shape(tmp_path, flat + SQUARE)
+    with pytest.raises(wf.SceneError, match="the transform of its mapping is singular"):
+        shape(tmp_path, f"Scale 1 0 1 {one} Identity {SQUARE}")
+
+
 def test_textures_of_numbers_make_roughness(tmp_path: Path) -> None:
     write_image(tmp_path / "r.exr", np.full((2, 2, 3), 0.0625, np.float32))
     text = """Texture "r" "float" "imagemap" "string filename" "r.exr"
@@ -719,11 +889,18 @@ def test_objects_are_placed_by_both_transforms(tmp_path: Path) -> None:
     scene = load(tmp_path, f'{body} Scale -2 1 1 ObjectInstance "o"')
     assert all(isinstance(each, wf.Instance) for each in scene.shapes)
     assert len({id(each.mesh) for each in scene.shapes}) == 2  # type: ignore[attr-defined]
-    flat = [each.to_mesh() for each in scene.shapes[:2]]  # type: ignore[attr-defined]
+    flat = [each.to_mesh() for each in scene.shapes[::2]]  # type: ignore[attr-defined]
     # each transform holds all that was in force where it was stated: 1 + 1 in x
     assert [mesh.vertices[0].tolist() for mesh in flat] == [[2, 1, 1], [-1, 1, 1]]
     assert (front(flat[0])[0][:, 2] > 0).all()
     assert (front(flat[1])[0][:, 2] > 0).all()  # a reflection keeps the front
+
+
+def test_balls_of_objects_are_exact_unless_they_are_stretched(tmp_path: Path) -> None:
+    body = f'ObjectBegin "o" Translate 0 1 0 {BALL} ObjectEnd Scale 2 -2 2 ObjectInstance "o"'
+    (ball,) = load(tmp_path, body).shapes
+    assert isinstance(ball, wf.Sphere)
+    assert (ball.center.tolist(), ball.radius) == ([0, -2, 0], 2 * shape(tmp_path, BALL).radius)
 
 
 # ---- what is not honored
@@ -785,9 +962,9 @@ def test_objects_are_placed_by_both_transforms(tmp_path: Path) -> None:
         ),
         (
             "",
-            'Texture "t" "spectrum" "checkerboard" "string mapping" "planar" '
+            'Texture "t" "spectrum" "checkerboard" "integer dimension" 3 '
             f'Material "diffuse" "texture reflectance" "t" {BALL}',
-            "texture 'checkerboard' 't': mapping 'planar'",
+            "texture 'checkerboard' 't': dimension 3",
         ),
         (
             "",

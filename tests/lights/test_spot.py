@@ -69,10 +69,24 @@ def test_a_hard_edge() -> None:
     assert [intensity(light, a) for a in (0, 29.99, 30.01)] == pytest.approx([1, 1, 0], abs=1e-6)
 
 
+@pytest.mark.parametrize("degrees", [5.0, 20.0, 27.0, 38.0, 45.0])
+def test_a_smooth_step_is_that_of_pbrt(degrees: float) -> None:
+    """SmoothStep(cos θ, cos of the end, cos of the start), in lights.cpp of pbrt-v4."""
+    light = wf.SpotLight((0, 0, 0), 3, direction=(0, -1, 0), angle=80, blend=0.5, falloff="smoothstep")
+    begin, end, cos = np.cos(np.radians([20, 40, degrees]))
+    t = np.clip((cos - end) / (begin - end), 0, 1)
+    assert intensity(light, degrees) == pytest.approx(3 * t * t * (3 - 2 * t), abs=1e-5)
+    away = np.sin(np.radians(degrees)), -np.cos(np.radians(degrees)), 0.0
+    bound = light.record(ORIGIN).irradiance(np.reshape(away, (3, 1)), 1e-6, 9.0)[0, 0]
+    assert bound == pytest.approx(intensity(light, degrees), abs=1e-4)
+
+
+@pytest.mark.parametrize("falloff", ["smooth", "smoothstep"])
 @pytest.mark.parametrize("blend", [0.0, 0.3, 1.0])
 @pytest.mark.parametrize("angle", [10.0, 90.0, 180.0])
-def test_power_is_the_integral_of_the_intensity(angle: float, blend: float) -> None:
-    light = wf.SpotLight((0, 0, 0), (1.0, 2.0, 6.0), direction=(0, -1, 0), angle=angle, blend=blend)
+def test_power_is_the_integral_of_the_intensity(angle: float, blend: float, falloff: Any) -> None:
+    cone = {"angle": angle, "blend": blend, "falloff": falloff}
+    light = wf.SpotLight((0, 0, 0), (1.0, 2.0, 6.0), direction=(0, -1, 0), **cone)
     n = 4000
     theta = np.radians(angle / 2) * (np.arange(n) + 0.5) / n
     points = 2 * np.stack([np.sin(theta), -np.cos(theta), 0 * theta]).astype(f4)
@@ -151,7 +165,10 @@ BAD = {
     "intensity": ({"intensity": (1, -1, 1)}, r"SpotLight intensity\[1\] is -1; it must be at least 0"),
     "angle 0": ({"angle": 0}, "SpotLight angle is 0; it must be above 0 and at most 180 degrees"),
     "angle large": ({"angle": 181}, "SpotLight angle is 181"),
-    "falloff": ({"falloff": "cubic"}, "SpotLight falloff is 'cubic'; it must be one of smooth, linear"),
+    "falloff": (
+        {"falloff": "cubic"},
+        "falloff is 'cubic'; it must be one of smooth, linear, smoothstep",
+    ),
     "blend": ({"blend": 1.5}, r"SpotLight blend is 1.5; it must be in \[0, 1\]"),
 }
 

@@ -127,7 +127,47 @@ def _web(name: str, text: str, tilt: str) -> Web:
     return Web(parsed_luminaire(name, text, tilt))
 
 
-class IESLight(LightAtPoint):
+class WebLight(LightAtPoint):
+    """A point whose intensity by direction is that of a web.
+
+    Parameters
+    ----------
+    web
+        The intensity, over `intensity`.
+    position
+        (3,) scene units.
+    axes
+        (3, 3) unit vectors as columns: the axis of the polar angles, the directions of azimuth 0° and 90°.
+    intensity
+        W/sr for 1 of the web, one number or three.
+    group
+        Name of the light group.
+    """
+
+    hint = "direct the light"
+    position: Parameter[ArrayLike] = Parameter(position)
+    intensity: Parameter[ArrayLike] = Parameter(intensity_of)
+    group: Parameter[str] = Parameter(group_name)
+
+    def __init__(
+        self, web: Web, position: ArrayLike, axes: Doubles, intensity: ArrayLike, group: str = DEFAULT_GROUP
+    ) -> None:
+        self._web, self.position, self.intensity, self.group = web, position, intensity, group
+        self._axes = axes
+
+    @property
+    def axes(self) -> Doubles:
+        """The axis of the polar angles, and the directions of azimuth 0° and 90°, as columns (3, 3)."""
+        return self._axes
+
+    def record(self, center: Doubles) -> IESLights:
+        """Return the light as a record of one column, relative to `center` (3,)."""
+        where = (self.position - center).astype(f4).reshape(3, 1)
+        along, zero, quarter = self.axes.astype(f4).T.reshape(3, 3, 1)
+        return IESLights(where, along, zero, quarter, self.intensity.astype(f4), self._web)
+
+
+class IESLight(WebLight):
     """A luminaire: a point whose luminous intensity by direction is that of a file.
 
     Parameters
@@ -177,9 +217,6 @@ class IESLight(LightAtPoint):
     """
 
     hint = "direct the IESLight"
-    position: Parameter[ArrayLike] = Parameter(position)
-    intensity: Parameter[ArrayLike] = Parameter(intensity_of)
-    group: Parameter[str] = Parameter(group_name)
     direction: Parameter[ArrayLike] = Parameter(unit)
     c0: Parameter[ArrayLike] = Parameter(unit)
 
@@ -227,10 +264,9 @@ class IESLight(LightAtPoint):
         """Luminous flux, lm."""
         return self._web.flux * float(to_photometric(self.intensity[:, 0], efficacy=self.efficacy))
 
-    def record(self, center: Doubles) -> IESLights:
-        """Return the light as a record of one column, relative to `center` (3,)."""
-        down = self.direction.astype(f4).reshape(3, 1)
-        right, x = sides_of(self.direction, self.c0)
-        axes = (-x, down, -right) if self._web.horizontal else (down, x, -right)
-        where = (self.position - center).astype(f4).reshape(3, 1)
-        return IESLights(where, axes[0], axes[1], axes[2], self.intensity.astype(f4), self._web)
+    @property
+    def axes(self) -> Doubles:
+        """The axis of the polar angles, and the directions of azimuth 0° and 90°, as columns (3, 3)."""
+        right, x = (side.reshape(3).astype(np.float64) for side in sides_of(self.direction, self.c0))
+        down = self.direction
+        return np.stack([-x, down, -right] if self._web.horizontal else [down, x, -right], 1)

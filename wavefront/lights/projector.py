@@ -85,6 +85,7 @@ class Projector(AimedLight):
             np.full(1, 1e6, f4),
             self.intensity.astype(f4),
             np.zeros(1, f4),
+            np.zeros(1, f4),
             right * f4(1 / wide),
             up * f4(1 / high),
             self.picture,

@@ -32,6 +32,7 @@ class SpotLights(DeltaLight):
     intensity: Floats  # (3, k) W/sr on the axis
     # (k,) 1/(radians between both angles) where the falloff is linear in the angle, else 0
     linear: Floats
+    step: Floats  # (k,) 1 where the falloff is a smooth step in the cosine, else 0
 
     def sample_li(self, point: Floats, u: Floats) -> LightSample:
         """Return the direction to the light; radiance is I·falloff/d²."""
@@ -43,10 +44,10 @@ class SpotLights(DeltaLight):
     def power(self, scene_radius: float) -> Doubles:
         """2πI·(h_inner + (h_outer − h_inner)/3), the integral of the falloff; h = 1 − cos.
 
-        Of a linear one 2πI·(1 − (sin outer − sin inner)/(outer − inner)).
+        Of a smooth step with 1/2 for 1/3, of a linear one 2πI·(1 − (sin outer − sin inner)/(outer − inner)).
         """
         outer = self.outer.astype(np.float64)
-        solid_angle = 2 * np.pi * (outer - 2 / 3 / self.slope)
+        solid_angle = 2 * np.pi * (outer - (2 / 3 - self.step / 6) / self.slope)
         linear = self.linear.astype(np.float64)
         end = arccos(1 - outer)
         begin = end - 1 / np.where(linear > 0, linear, np.inf)
@@ -64,7 +65,7 @@ class SpotLights(DeltaLight):
         nearest = np.where(distance > radius, np.maximum(nearest, 0), 0)
         ramp = np.clip((self.outer - (1 - sin_cos_turns(nearest / (2 * np.pi))[1])) * self.slope, 0, 1)
         linear = np.clip((arccos(1 - self.outer.astype(np.float64)) - nearest) * self.linear, 0, 1)
-        falloff = np.where(self.linear > 0, linear, ramp**2)
+        falloff = np.where(self.linear > 0, linear, _eased(ramp, self.step))
         return self.intensity.mean(0, dtype=np.float64) * falloff / np.maximum(distance, radius) ** 2
 
     def emitters(self) -> Emitters:
@@ -77,17 +78,23 @@ class SpotLights(DeltaLight):
 
         Source: glTF 2.0, KHR_lights_punctual, "Inner and Outer Cone Angles": the square of a ramp
         in the cosine. Here 1 − cos takes the cosine's place, so that narrow cones keep their digits. Or a
-        ramp in the angle, as in Mitsuba 3.
+        ramp in the angle, as in Mitsuba 3, or 3t² − 2t³ of a ramp t in the cosine, as in pbrt-v4.
         """
         off = wi + self.axis
         away = f4(0.5) * dot(off, off)
         ramp = np.clip((self.outer - away) * self.slope, f4(0), f4(1))
         if not self.linear.any():
-            return ramp * ramp
+            return _eased(ramp, self.step)
         end, angle = (
             f4(2) * arcsin(np.sqrt(np.minimum(each * f4(0.5), f4(1)))) for each in (self.outer, away)
         )
-        return np.where(self.linear > 0, np.clip((end - angle) * self.linear, f4(0), f4(1)), ramp * ramp)
+        linear = np.clip((end - angle) * self.linear, f4(0), f4(1))
+        return np.where(self.linear > 0, linear, _eased(ramp, self.step))
+
+
+def _eased(ramp: Any, step: Floats) -> Any:
+    """Return the square of a ramp, or a smooth step where `step` is 1."""
+    return ramp * ramp * (f4(1) + step * (f4(2) - f4(2) * ramp))
 
 
 @soa
@@ -187,7 +194,7 @@ def _angle(name: str, value: float) -> float:
 
 
 target_of = optional(position)
-_falloff = partial(one_of, choices=("smooth", "linear"))
+_falloff = partial(one_of, choices=("smooth", "linear", "smoothstep"))
 
 
 def _blend(name: str, value: float) -> float:
@@ -212,7 +219,8 @@ class SpotLight(AimedLight):
         Part of the cone's angle, from the edge inwards, in which the light falls off: 0 is a hard
         edge, with 1 it falls off from the axis on.
     falloff
-        "smooth" is that of glTF, "linear" is linear in the angle, as in Mitsuba.
+        "smooth" is that of glTF, "linear" is linear in the angle, as in Mitsuba, and "smoothstep" is that of
+        pbrt.
     picture, up
         A `Texture`, or what makes one: its colors multiply the intensity, in a square around the cone. `up`
         is the direction (3,) of its upper edge.
@@ -241,7 +249,9 @@ class SpotLight(AimedLight):
     direction: Parameter[ArrayLike | None] = Parameter(optional(unit), default=None, kw_only=True)
     angle: Parameter[float] = Parameter(_angle, default=45.0, kw_only=True)
     blend: Parameter[float] = Parameter(_blend, default=0.15, kw_only=True)
-    falloff: Parameter[Literal["smooth", "linear"]] = Parameter(_falloff, default="smooth", kw_only=True)
+    falloff: Parameter[Literal["smooth", "linear", "smoothstep"]] = Parameter(
+        _falloff, default="smooth", kw_only=True
+    )
     picture: Parameter[Any] = Parameter(picture_of, default=None, kw_only=True)
     up: Parameter[ArrayLike] = Parameter(unit, default=(0, 1, 0), kw_only=True)
     group: Parameter[str] = Parameter(group_name, default=DEFAULT_GROUP, kw_only=True)
@@ -260,6 +270,7 @@ class SpotLight(AimedLight):
             np.array([1 / width], f4),
             self.intensity.astype(f4),
             np.array([1 / radians if self.falloff == "linear" else 0], f4),
+            np.array([self.falloff == "smoothstep"], f4),
         )
         if self.picture is None:
             return SpotLights(*spot)

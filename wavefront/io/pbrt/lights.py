@@ -9,13 +9,16 @@ import numpy as np
 from ...arrays.elementary import arctan2, sin_cos, sin_cos_turns
 from ...arrays.vec import Doubles, Floats, luminance, spans
 from ...codecs.encoding import codes_to_linear
+from ...codecs.luminaires import Photometry
 from ...core.errors import SceneError
 from ...lights import DirectionalLight, Environment, PointLight, Projector, SpotLight
+from ...lights.ies import Web, WebLight
 from ...textures.image import Texture
 from ..mitsuba.views import angle_of, half_tangent
 from .entities import Entity, Job, converts
 
 ROWS = 64  # of an environment that are looked up at once
+MOST_ANGLES = 1024  # of the table of a point light, from pole to pole
 SUBPIXELS = 2  # of its pixels, in both directions
 
 
@@ -46,13 +49,22 @@ def _point(entity: Entity, job: Job) -> PointLight:
 
 
 @converts("light", "goniometric")
-def _goniometric(entity: Entity, job: Job) -> PointLight:
-    mean = 1.0
-    if entity.text("filename", ""):
-        entity.lose("how its light depends on the direction; the mean in its place")
-        mean = float(_pixels(entity, job).mean())
-    intensity = _strength(entity, "I", job) * (mean * _measured(entity, "power", 4 * np.pi * mean))
-    return PointLight((job.world @ entity.matrix)[:3, 3], intensity)
+def _goniometric(entity: Entity, job: Job) -> PointLight | WebLight:
+    """Return a point whose intensity by direction is that of an equal-area image; its pole is y."""
+    matrix, strength = job.world @ entity.matrix, _strength(entity, "I", job)
+    if not entity.text("filename", ""):
+        return PointLight(matrix[:3, 3], strength * _measured(entity, "power", 4 * np.pi))
+    factors = _square(entity, job).mean(2, keepdims=True)
+    size = len(factors)
+    count = min(size, MOST_ANGLES)
+    polar, azimuth = (np.arange(n * count + 1, dtype=np.float64) * (180 / count) for n in (1, 2))
+    (sin, cos), around = (sin_cos_turns(angle / 360) for angle in (polar, azimuth[:, None]))
+    at = np.stack(np.broadcast_arrays(around[1] * sin, around[0] * sin, cos))
+    table = _bilinear(_padded(factors), *sphere_to_square(at), size)[..., 0].astype(np.float64)
+    web = Web(Photometry(azimuth, polar, table))
+    axes = matrix[:3, [1, 0, 2]] / np.linalg.norm(matrix[:3, [1, 0, 2]], axis=0)
+    own = 4 * np.pi * float(factors.mean())
+    return WebLight(web, matrix[:3, 3], axes, strength * _measured(entity, "power", own))
 
 
 @converts("light", "spot")
@@ -62,17 +74,13 @@ def _spot(entity: Entity, job: Job) -> SpotLight:
     inner = outer - entity.number("conedeltaangle", 5.0, lambda x: 0 <= x <= outer, f"in [0, {outer:g}]")
     begin, last = (float(sin_cos(np.float64(np.radians(angle)))[1]) for angle in (inner, outer))
     solid = 2 * np.pi * ((1 - begin) + (begin - last) / 2)
-    if begin > last:
-        entity.lose("the form of its falloff; one of the same power in its place")
-    # a square ramp has 1/3 of the full light where pbrt's smooth step has 1/2
-    cosine = 0.75 * begin + 0.25 * last
-    angle = float(np.degrees(arctan2(np.sqrt(np.float64(1 - cosine**2)), np.float64(cosine))))
     return SpotLight(
         start,
         _strength(entity, "I", job) * _measured(entity, "power", solid),
         target=end,
         angle=2 * outer,
-        blend=float(np.clip(1 - angle / outer, 0, 1)),
+        blend=1 - inner / outer,
+        falloff="smoothstep",
     )
 
 
@@ -107,10 +115,8 @@ def _infinite(entity: Entity, job: Job) -> Environment:
         return Environment(_strength(entity, "L", job) * _measured(entity, "illuminance", np.pi))
     if "L" in entity.values:
         raise SceneError("has L and filename; give one of them")
-    pixels = _pixels(entity, job)
+    pixels = _square(entity, job)
     size = len(pixels)
-    if pixels.shape[1] != size:
-        raise SceneError(f"its image has {pixels.shape[1]} × {size} pixels; it must be square (equal-area)")
     # one lookup for each pixel, in the middle of it
     at = (np.arange(size) + 0.5) / size
     upward = np.maximum(square_to_sphere(*np.meshgrid(at, at))[2], 0)
@@ -145,6 +151,15 @@ def _pixels(entity: Entity, job: Job) -> Floats:
     return np.maximum(pixels, 0)
 
 
+def _square(entity: Entity, job: Job) -> Floats:
+    """Return the linear colors of an equal-area image, (n, n, 3)."""
+    pixels = _pixels(entity, job)
+    height, width = pixels.shape[:2]
+    if width != height:
+        raise SceneError(f"its image has {width} × {height} pixels; it must be square (equal-area)")
+    return pixels
+
+
 def square_to_sphere(x: Doubles, y: Doubles) -> Doubles:
     """Return the directions (3, ...) of points of a square, from 0 to 1, where equal areas are solid angles.
 
@@ -175,10 +190,7 @@ def sphere_to_square(d: Doubles) -> tuple[Doubles, Doubles]:
 
 def _by_longitude(pixels: Floats, to_light: Doubles) -> Floats:
     """Return an image of `Environment` (n, 2n, 3) of one that is equal-area (n, n, 3)."""
-    size = len(pixels)
-    # what is beyond an edge is turned about the middle of that edge
-    rows = np.concatenate([pixels[:1, ::-1], pixels, pixels[-1:, ::-1]])
-    padded = np.concatenate([rows[::-1, :1], rows, rows[::-1, -1:]], 1)
+    size, padded = len(pixels), _padded(pixels)
     out = np.empty((size, 2 * size, 3), np.float32)
     turns = (np.arange(2 * size * SUBPIXELS) + 0.5) / (2 * size * SUBPIXELS) - 0.5
     across = sin_cos_turns(turns)
@@ -193,6 +205,13 @@ def _by_longitude(pixels: Floats, to_light: Doubles) -> Floats:
         found = _bilinear(padded, *sphere_to_square(d / np.sqrt(d[0] ** 2 + d[1] ** 2 + d[2] ** 2)), size)
         out[part] = found.reshape(count, SUBPIXELS, 2 * size, SUBPIXELS, 3).mean((1, 3))
     return out
+
+
+def _padded(pixels: Floats) -> Floats:
+    """Return an equal-area image with one pixel more at each edge."""
+    # what is beyond an edge is turned about the middle of that edge
+    rows = np.concatenate([pixels[:1, ::-1], pixels, pixels[-1:, ::-1]])
+    return np.concatenate([rows[::-1, :1], rows, rows[::-1, -1:]], 1)
 
 
 def _bilinear(padded: Floats, u: Doubles, v: Doubles, size: int) -> Floats:

@@ -21,7 +21,7 @@ from ..sources import SceneFiles
 from . import lights, materials, textures  # noqa: F401  they fill the table
 from .entities import Entity, Job
 from .parser import Parameter, Statement, statements
-from .shapes import instances, place
+from .shapes import place, place_object
 from .views import exposure_of, mirror_of
 
 OPTIONS = ("Camera", "Film", "Sampler", "Integrator", "PixelFilter", "Accelerator", "WorldBegin")
@@ -98,7 +98,7 @@ class Reader:
         settings = {"filter": GaussianFilter(windowed=True), "spp": 16, "max_bounces": 5}
         job.exposure = exposure_of(film, camera)
         if camera is not None:
-            job.world = mirror_of(camera.matrix)
+            job.world = mirror_of(camera)
             with placed(camera.label):
                 job.around = job.medium(camera.state.outside)
             job.film = ((1280, 720), None) if film is None else job.convert(film)
@@ -107,8 +107,7 @@ class Reader:
                 settings |= job.convert(self.options[name])
         found = [shape for entity in self.shapes for shape in place(entity, job)]
         for name, matrices in self.uses.items():
-            for entity in self.objects[name]:
-                found += instances(entity, job, np.array(matrices))
+            found += place_object(self.objects[name], job, np.array(matrices))
         lamps = [light for entity in self.lights if (light := job.convert(entity)) is not None]
         view = None if camera is None else job.convert(camera)
         job.lost.report(job.name, job.strict)

@@ -2,27 +2,28 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Sequence
 from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
 from ...arrays.elementary import arccos, sin_cos_turns
-from ...arrays.vec import Doubles, Ints, cross
+from ...arrays.vec import Doubles, cross
 from ...core.errors import SceneError
-from ...shapes import Instance, Mesh, Shape, Sphere
-from ...shapes.transform import Matrix
+from ...shapes import Group, Mesh, Shape, Sphere
+from ...shapes.transform import EVEN, Matrix
 from ...textures.base import BaseTexture
 from ..conversion import placed, textures_in
 from ..placing import in_range, moved_raw
 from ..repair import RawMesh, build
+from ..surfaces import RINGS, SIDES, over_square
 from ..trimesh_import import import_trimesh
 from .entities import Entity, Job, converts, unsupported
+from .mappings import Mapped, Mapping
 from .materials import material_of
 from .textures import clipped, computed, product, scalar
 
-SIDES, RINGS = 128, 64  # of round shapes that are meshes
 ROUND = 1e-5  # relative difference of the scales along two axes that is taken for rounding
 POINTS, PAIRS, NORMALS = ("point3", "point"), ("point2", "float"), ("normal3", "normal")
 
@@ -41,7 +42,7 @@ def _sphere(entity: Entity, job: Job) -> RawMesh:
         normal = np.stack([around[1] * sin, around[0] * sin, cos], 1)
         return normal * radius, normal
 
-    return _grid("sphere", SIDES, RINGS, point)
+    return over_square("sphere", SIDES, RINGS, point)
 
 
 @converts("shape", "cylinder")
@@ -54,7 +55,7 @@ def _cylinder(entity: Entity, job: Job) -> RawMesh:
         normal = np.stack([cos, sin, np.zeros_like(u)], 1)
         return normal * radius + (low + (high - low) * v)[:, None] * (0, 0, 1), normal
 
-    return _grid("cylinder", SIDES, 1, point)
+    return over_square("cylinder", SIDES, 1, point)
 
 
 @converts("shape", "disk")
@@ -67,7 +68,7 @@ def _disk(entity: Entity, job: Job) -> RawMesh:
         size = radius + (inner - radius) * v
         return np.stack([cos * size, sin * size, np.full_like(u, height)], 1), None
 
-    return _grid("disk", SIDES, 1, point)
+    return over_square("disk", SIDES, 1, point)
 
 
 @converts("shape", "trianglemesh")
@@ -86,9 +87,8 @@ def _bilinear_mesh(entity: Entity, job: Job) -> RawMesh:
     if (np.abs((np.cross(b - a, c - a) * (d - a)).sum(1)) > 1e-6 * size**3).any():
         entity.lose("the curvature of its patches; two triangles for each")
     if raw.uvs is None:
-        corners = patches.ravel()
-        raw = _corners_apart(raw, corners, np.tile([[0.0, 0], [1, 0], [0, 1], [1, 1]], (len(patches), 1)))
-        patches = np.arange(len(corners)).reshape(-1, 4)
+        raw = _corners_apart(raw, uvs=np.tile([[0.0, 0], [1, 0], [0, 1], [1, 1]], (len(patches), 1)))
+        patches = raw.faces.reshape(-1, 4)
     return replace(raw, faces=patches[:, [0, 1, 3, 0, 3, 2]].reshape(-1, 3))
 
 
@@ -123,20 +123,6 @@ def _radius(entity: Entity) -> float:
 
 def _turns(entity: Entity) -> float:
     return entity.number("phimax", 360.0, lambda x: 0 < x <= 360, "above 0 and at most 360 degrees") / 360
-
-
-def _grid(name: str, columns: int, rows: int, point: Callable[[Doubles, Doubles], Any]) -> RawMesh:
-    """Return a surface over the unit square, whose front is on the side of ∂p/∂u × ∂p/∂v."""
-    u, v = (
-        each.ravel() for each in np.meshgrid(np.arange(columns + 1) / columns, np.arange(rows + 1) / rows)
-    )
-    vertices, normals = point(u, v)
-    corner = (np.arange(rows)[:, None] * (columns + 1) + np.arange(columns)).ravel()
-    above = corner + columns + 1
-    faces = np.stack([corner, corner + 1, above + 1, corner, above + 1, above], 1).reshape(-1, 3)
-    a, b, c = (vertices[faces[:, i]] for i in range(3))
-    kept = np.linalg.norm(np.cross(b - a, c - a), axis=1) > 1e-12 * np.square(np.abs(vertices).max())
-    return RawMesh(name, vertices, faces[kept], normals, np.stack([u, v], 1))
 
 
 def _arrays(entity: Entity, corners: int) -> RawMesh:
@@ -179,34 +165,49 @@ def _checked(raw: RawMesh) -> RawMesh:
 def place(entity: Entity, job: Job) -> list[Shape]:
     """Return a shape where it stands in the scene."""
     with placed(entity.label):
-        matrix = job.world @ entity.matrix
-        shape = _exact_sphere(entity, job, matrix) or _mesh(entity, job, matrix, entity.state.area)
-        return [] if shape is None else [shape]
+        return _shapes(entity, job, job.world @ entity.matrix, entity.state.area)
 
 
-def instances(entity: Entity, job: Job, matrices: Matrix) -> list[Shape]:
-    """Return a shape of an object at each of several places, (n, 4, 4)."""
-    with placed(entity.label):
-        job.instances += len(matrices)
-        most = job.files.limits.instances
-        if job.instances > most:
-            raise SceneError(f"there are more than {most} instances; the limit is LoadLimits.instances")
-        if entity.state.area is not None:
-            entity.lose("the light of a shape in an object")
-        mesh = _mesh(entity, job, entity.matrix, None)
-        return [] if mesh is None else list(Instance.many(mesh, job.world @ matrices))
+def place_object(entities: Sequence[Entity], job: Job, matrices: Matrix) -> list[Shape]:
+    """Return the shapes of an object at each of several places, (n, 4, 4)."""
+    even = _is_even(matrices, EVEN)
+    shapes: list[Shape] = []
+    for entity in entities:
+        with placed(entity.label):
+            job.count_instances(len(matrices))
+            if entity.state.area is not None:
+                entity.lose("the light of a shape in an object")
+            made = _shapes(entity, job, job.world @ entity.matrix, None, even)
+            if any(_mappings(shape.material) for shape in made):
+                entity.lose("where its instances are; all have the texture coordinates of the object")
+            shapes += made
+    with placed(entities[0].label if entities else job.name):
+        return list(Group(shapes).placed(job.world @ matrices @ np.linalg.inv(job.world)))
 
 
-def _exact_sphere(entity: Entity, job: Job, matrix: Matrix) -> Sphere | None:
+def _shapes(entity: Entity, job: Job, matrix: Matrix, light: Entity | None, even: bool = True) -> list[Shape]:
+    """Return a shape, placed by a matrix, which may be an area light; `even` if it is not stretched later."""
+    exact = _exact_sphere(entity, job, matrix, light) if even else None
+    shape = exact or _mesh(entity, job, matrix, light)
+    return [] if shape is None else [shape]
+
+
+def _is_even(matrices: Matrix, most: float) -> bool:
+    """Return whether matrices (n, 4, 4) scale alike in all directions, up to a relative difference."""
+    scales = np.linalg.svd(matrices[:, :3, :3], compute_uv=False)
+    return bool((scales[:, 0] - scales[:, 2] <= most * scales[:, 0]).all())
+
+
+def _exact_sphere(entity: Entity, job: Job, matrix: Matrix, light: Entity | None) -> Sphere | None:
     """Return a sphere that needs no mesh: a whole one, without textures, that is not stretched."""
     if entity.type != "sphere" or entity.values.keys() - {"radius", "alpha"} or entity.state.reverse:
         return None
-    scale = np.linalg.svd(matrix[:3, :3], compute_uv=False)
-    if np.ptp(scale) > ROUND * scale.max():
+    if not _is_even(matrix[None], ROUND):
         return None
-    alpha, radius = _opacity(entity, entity.state.area, job), _radius(entity) * scale[0]
+    alpha = _opacity(entity, light, job)
+    radius = _radius(entity) * float(np.linalg.svd(matrix[:3, :3], compute_uv=False)[0])
     material = material_of(entity.state, alpha, job, entity)
-    emission, _ = _emission(entity.state.area, 4 * np.pi * radius**2, job)
+    emission, _ = _emission(light, 4 * np.pi * radius**2, job)
     if textures_in((material, emission)):
         return None
     return Sphere(matrix[:3, 3], radius, material=material, emission=emission)
@@ -225,11 +226,22 @@ def _mesh(entity: Entity, job: Job, matrix: Matrix, light: Entity | None) -> Mes
     job.count(raw.faces)
     raw.material = material_of(entity.state, _opacity(entity, light, job), job, entity)
     raw.emission, raw.two_sided = _emission(light, area, job)
-    if raw.uvs is None and textures_in((raw.material, raw.emission)):
+    return build(entity.place, _with_coordinates(entity, raw), job.strict)
+
+
+def _with_coordinates(entity: Entity, raw: RawMesh) -> RawMesh:
+    """Return a mesh with the texture coordinates that its textures need and that it has not."""
+    parts = raw.material, raw.emission
+    mappings = _mappings(parts)
+    if raw.uvs is None and textures_in(parts):
         uvs = np.tile([[0.0, 0], [1, 0], [1, 1]], (len(raw.faces), 1))  # of each triangle, as in pbrt
-        raw = _corners_apart(raw, raw.faces.ravel(), uvs)
-        raw.faces = np.arange(len(uvs)).reshape(-1, 3)
-    return build(entity.place, raw, job.strict)
+        raw = _corners_apart(raw, uvs=uvs)
+    if mappings:
+        first, *more = mappings.values()
+        if more:
+            entity.lose("a second mapping by the place; the first one in its place")
+        raw = _corners_apart(raw, uvs1=first.at_corners(raw.vertices, raw.faces))
+    return raw
 
 
 def _opacity(entity: Entity, light: Entity | None, job: Job) -> Any:
@@ -274,7 +286,17 @@ def _facing(raw: RawMesh, reverse: bool) -> RawMesh:
     return replace(raw, faces=faces, normals=normals)
 
 
-def _corners_apart(raw: RawMesh, corners: Ints, uvs: Doubles) -> RawMesh:
-    """Return a mesh with a vertex for each corner (n,) of its faces, and texture coordinates (n, 2)."""
-    normals = None if raw.normals is None else raw.normals[corners]
-    return replace(raw, vertices=raw.vertices[corners], normals=normals, uvs=uvs)
+def _mappings(thing: Any) -> dict[Any, Mapping]:
+    """Return the mappings by the place of the textures in something."""
+    found = (each.mapping for each in textures_in(thing, Mapped))
+    return {each.key: each for each in found if each.coordinates is not None}
+
+
+def _corners_apart(raw: RawMesh, **given: Doubles) -> RawMesh:
+    """Return a mesh with a vertex for each corner of its faces, and values given for these."""
+    corners = raw.faces.ravel()
+    apart = replace(raw, faces=np.arange(len(corners)).reshape(raw.faces.shape))
+    for name in ("vertices", "normals", "uvs", "uvs1"):
+        values = getattr(raw, name)
+        setattr(apart, name, None if values is None else values[corners])
+    return replace(apart, **given)  # type: ignore[arg-type]

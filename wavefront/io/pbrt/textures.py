@@ -9,13 +9,16 @@ from typing import Any
 import numpy as np
 
 from ...arrays.state import SurfaceInteraction
-from ...arrays.vec import Doubles, Floats, f4
+from ...arrays.vec import Doubles, Floats, dot, f4
 from ...core.errors import SceneError
 from ...textures.base import BaseTexture
-from ...textures.image import Texture
+from ...textures.image import UV_SETS, Texture
 from .entities import Entity, Job, converts, unsupported
+from .mappings import Mapped, MappedTexture, Mapping, mapping_of
+from .noise import noise
 
 Value = Any  # a number, a color (3,) or a texture
+DOT = 0.35  # radius of dots in cells of size 1
 
 
 class Computed(BaseTexture):
@@ -23,10 +26,10 @@ class Computed(BaseTexture):
 
     def __init__(self, function: Callable[..., Any], *parts: Any, limits: tuple[float, ...] = ()) -> None:
         self.function, self._limits = function, limits
-        self.parts = [
+        self.parts = tuple(
             part if isinstance(part, BaseTexture) else np.asarray(part, f4).reshape(-1, 1)  # (1, 1) or (3, 1)
             for part in parts
-        ]
+        )
         textures = [part for part in parts if isinstance(part, BaseTexture)]
         self.reads = tuple(dict.fromkeys(field for each in textures for field in each.reads))
         self.scalar = all(
@@ -43,11 +46,42 @@ class Computed(BaseTexture):
 
     def at(self, surface: SurfaceInteraction) -> Floats:
         """Return the values of the function, (n,) or (3, n)."""
-        assert surface.uv is not None
         found = (part.at(surface) if isinstance(part, BaseTexture) else part for part in self.parts)
         values = self.function(*(np.atleast_2d(each) for each in found))
-        values = np.broadcast_to(values, (len(values), surface.uv.shape[1])).astype(f4)
+        values = np.broadcast_to(values, (len(values), values.shape[1])).astype(f4)
         return values[0] if self.scalar else np.broadcast_to(values, (3, values.shape[1]))
+
+
+class Coordinate(BaseTexture, Mapped):
+    """One of the two texture coordinates of a mapping."""
+
+    scalar = True
+
+    def __init__(self, mapping: Mapping, axis: int) -> None:
+        self.mapping, self.axis, self.reads = mapping, axis, (UV_SETS[mapping.uv_set],)
+
+    def at(self, surface: SurfaceInteraction) -> Floats:
+        """Return the coordinates, (n,)."""
+        uv: Floats = getattr(surface, self.reads[0])
+        a, b, c = self.mapping.transform[self.axis].astype(f4)
+        return a * uv[0] + b * uv[1] + c
+
+
+class Facing(BaseTexture):
+    """|cos| of the angle between the surface's normal and a direction."""
+
+    reads, scalar = (), True
+
+    def __init__(self, direction: Doubles) -> None:
+        self.direction = direction.astype(f4).reshape(3, 1)
+
+    def limits(self) -> tuple[float, ...]:
+        """Return 0 and 1."""
+        return 0.0, 1.0
+
+    def at(self, surface: SurfaceInteraction) -> Floats:
+        """Return the cosines, (n,)."""
+        return np.minimum(np.abs(dot(surface.ng, self.direction)), f4(1))
 
 
 def product(a: Any, b: Any) -> Any:
@@ -146,9 +180,12 @@ def _checkerboard(entity: Entity, job: Job) -> Value:
     if entity.whole("dimension", 2, 2, 3) == 3:
         entity.lose("dimension 3; the mean in its place")
         return _between(one, two, 0.5)
-    transform = _mapping(entity) * np.array([[0.5], [0.5], [1]])  # four fields in a unit square
     fields = np.array([[1.0, 0.0], [0.0, 1.0]], np.float32)  # the top row is v > 1/2
-    return _between(one, two, Texture(fields, filter="nearest", transform=transform, channel=0))
+    mapping = mapping_of(entity, job)
+    transform = mapping.transform * np.array([[0.5], [0.5], [1]])  # four fields in a unit square
+    texture = MappedTexture(fields, filter="nearest", transform=transform, channel=0, uv_set=mapping.uv_set)
+    texture.mapping = mapping
+    return _between(one, two, texture)
 
 
 @converts("texture", "imagemap")
@@ -158,7 +195,55 @@ def _imagemap(entity: Entity, job: Job) -> Value:
     return image(entity, job, "luminance" if numbers else None)
 
 
-unsupported("texture", "bilerp directionmix dots fbm marble ptex windy wrinkled")
+@converts("texture", "bilerp")
+def _bilerp(entity: Entity, job: Job) -> Value:
+    """Return a texture of four values at the corners of the unit square, which goes on beyond it."""
+    corners = [
+        entity.number(name, value)
+        if entity.kind == "float texture"
+        else entity.spectrum(name, value, job, "unbounded")
+        for name, value in (("v00", 0.0), ("v01", 1.0), ("v10", 0.0), ("v11", 1.0))
+    ]
+    return computed(bilinear, *corners, *_coordinates(entity, job), rising=False)
+
+
+@converts("texture", "dots")
+def _dots(entity: Entity, job: Job) -> Value:
+    inside, outside = part(entity, "inside", 1.0, job), part(entity, "outside", 0.0, job)
+    inner = Computed(inside_dots, *_coordinates(entity, job), limits=(0.0, 1.0))
+    return _between(outside, inside, inner)
+
+
+@converts("texture", "directionmix")
+def _direction_mix(entity: Entity, job: Job) -> Value:
+    one, two = (part(entity, f"tex{i}", i - 1.0, job) for i in (1, 2))
+    direction = (job.world @ entity.matrix)[:3, :3] @ entity.vector("dir", (0.0, 1.0, 0.0))
+    size = np.linalg.norm(direction)
+    if not size > 0:
+        raise SceneError("dir must not be zero")
+    return _between(two, one, Facing(direction / size))
+
+
+unsupported("texture", "fbm marble ptex windy wrinkled")
+
+
+def bilinear(v00: Any, v01: Any, v10: Any, v11: Any, s: Any, t: Any) -> Any:
+    """Return the value at (s, t) of those at (0, 0), (0, 1), (1, 0) and (1, 1)."""
+    one = f4(1)
+    return (one - s) * ((one - t) * v00 + t * v01) + s * ((one - t) * v10 + t * v11)
+
+
+def inside_dots(s: Any, t: Any) -> Any:
+    """Return 1 inside of dots of radius 0.35, and 0 elsewhere: one of two cells has a dot, by chance.
+
+    Source: pbrt-v4, the texture "dots".
+    """
+    column, row = np.floor(s + f4(0.5)), np.floor(t + f4(0.5))
+    shift = f4(0.5 - DOT)
+    x = s - column - shift * noise(column + f4(1.5), row + f4(2.8))
+    y = t - row - shift * noise(column + f4(4.5), row + f4(9.8))
+    there = noise(column + f4(0.5), row + f4(0.5)) > 0
+    return (there & (x * x + y * y < f4(DOT * DOT))).astype(f4)
 
 
 def image(entity: Entity, job: Job, channel: str | None) -> Texture:
@@ -175,15 +260,18 @@ def image(entity: Entity, job: Job, channel: str | None) -> Texture:
     if wrap == "black":
         entity.lose("wrap 'black'; 'clamp' in its place")
     kind = entity.choice("filter", "bilinear", ("bilinear", "point", "trilinear", "ewa", "EWA"))
-    texture = Texture(
+    mapping = mapping_of(entity, job)
+    texture = MappedTexture(
         codes,
         srgb=encoding == "sRGB",
         wrap="clamp" if wrap == "black" else wrap,  # type: ignore[arg-type]
         filter="nearest" if kind == "point" else "bilinear",
-        transform=_mapping(entity),
+        transform=mapping.transform,
         channel=channel,  # type: ignore[arg-type]
+        uv_set=mapping.uv_set,
         max_pixels=job.files.limits.pixels,
     )
+    texture.mapping = mapping
     scaled = _scaled(texture, entity.number("scale", 1.0))
     return _scaled(scaled, -1.0, 1.0) if entity.flag("invert") else scaled
 
@@ -214,15 +302,7 @@ def _between(one: Value, two: Value, amount: Value) -> Value:
     return value
 
 
-def _mapping(entity: Entity) -> Doubles:
-    """Return the transform of texture coordinates, (3, 3)."""
-    kind = entity.choice("mapping", "uv", ("uv", "spherical", "cylindrical", "planar"))
-    if kind != "uv":
-        entity.lose(f"mapping {kind!r}; 'uv' in its place")
-        entity.harmless("v1 v2")
-    numbers = [entity.number(name, default) for name, default in _UV]
-    scale_u, scale_v, shift_u, shift_v = numbers
-    return np.array([[scale_u, 0, shift_u], [0, scale_v, shift_v], [0, 0, 1]])
-
-
-_UV = (("uscale", 1.0), ("vscale", 1.0), ("udelta", 0.0), ("vdelta", 0.0))
+def _coordinates(entity: Entity, job: Job) -> tuple[Coordinate, Coordinate]:
+    """Return both texture coordinates."""
+    mapping = mapping_of(entity, job)
+    return Coordinate(mapping, 0), Coordinate(mapping, 1)

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from ...camera import Camera
-from ...camera.projection import Orthographic, Perspective, Projection
+from ...camera.projection import Orthographic, Panorama, Perspective, Projection
 from ...core.errors import SceneError
 from ...sampling.filters import BoxFilter, GaussianFilter, TentFilter
 from ...shapes.transform import Matrix
@@ -18,16 +18,30 @@ Settings = dict[str, Any]
 TALL = 1e-3  # relative difference of a pixel's sides that is taken for rounding
 
 
-def mirror_of(camera: Matrix) -> Matrix:
+def mirror_of(camera: Entity) -> Matrix:
     """Return the matrix that takes the world to the space of the scene.
 
     In pbrt's camera space x is to the right, y up and z ahead, which is left-handed. So a camera that is only
-    turned and moved sees a mirrored world, unless `Scale -1 1 1` is above it; then nothing is mirrored.
+    turned and moved sees a mirrored world, unless `Scale -1 1 1` is above it; then nothing is mirrored. Of a
+    spherical camera it is the other way round, whose picture turns to the left from its left edge on.
     """
-    return np.diag([-1.0 if np.linalg.det(camera[:3, :3]) > 0 else 1.0, 1, 1, 1])
+    mirrored = (np.linalg.det(camera.matrix[:3, :3]) > 0) != (camera.type == "spherical")
+    return np.diag([-1.0 if mirrored else 1.0, 1, 1, 1])
 
 
-@converts("camera", "perspective orthographic realistic spherical")
+@converts("camera", "spherical")
+def _spherical(entity: Entity, job: Job) -> Camera:
+    """Return a camera that sees all directions: its left edge shows x, and a quarter of its width z."""
+    entity.harmless("shutteropen shutterclose lensradius focaldistance frameaspectratio screenwindow")
+    if entity.choice("mapping", "equalarea", ("equalarea", "equirectangular")) == "equalarea":
+        entity.lose("mapping 'equalarea'; 'equirectangular' in its place")
+    size, crop = job.film
+    matrix = job.world @ entity.matrix
+    x, y, z = (matrix[:3, i] / np.linalg.norm(matrix[:3, i]) for i in range(3))
+    return Camera(matrix[:3, 3], np.stack([-z, y, x], 1), Panorama(), size, crop)
+
+
+@converts("camera", "perspective orthographic realistic")
 def _camera(entity: Entity, job: Job) -> Camera:
     """Return a camera for the size and the crop of the film."""
     (width, height), crop = job.film
