@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..arrays.elementary import sin_cos_turns
-from ..arrays.vec import Doubles, Ints
+from ..arrays.vec import Doubles, Ints, cross
 from ..core.errors import SceneError, as_array, finite_array, number, one_of
 
 Matrix = Doubles  # (4, 4), or several
@@ -82,10 +82,19 @@ def moved(
         faces = faces[:, ::-1]
     if normals is not None:
         # the matrix of cofactors transforms normals also if the scale along them is 0
-        a, b, c = linear.T
-        cofactors = np.stack([np.cross(b, c), np.cross(c, a), np.cross(a, b)], axis=1)
-        normals = normals @ (-cofactors if mirrored else cofactors).T
-    return vertices @ linear.T + shift, faces, normals
+        cofactors = cross(linear[:, [1, 2, 0]], linear[:, [2, 0, 1]])
+        normals = _rows_by(-cofactors if mirrored else cofactors, normals)
+    return _rows_by(linear, vertices) + shift, faces, normals
+
+
+def _rows_by(linear: Doubles, rows: Doubles) -> Doubles:
+    """Return rows (n, 3), each multiplied by a matrix (3, 3).
+
+    Component by component: the threads of BLAS, which has other bits elsewhere, wait for each other on a busy
+    machine.
+    """
+    x, y, z = rows.T
+    return np.stack([a * x + b * y + c * z for a, b, c in linear], 1)
 
 
 def translation(name: str, offset: ArrayLike) -> Matrix:

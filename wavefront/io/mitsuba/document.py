@@ -46,6 +46,7 @@ class Element(dict[str, Any]):
     """A dictionary of `mi.load_dict` that knows where it was in a file."""
 
     place: str = ""
+    unnamed: int = 0  # how many of its parameters have been given a name
 
 
 @dataclass
@@ -279,7 +280,8 @@ def _unknown(name: str) -> str:
 def _set(parent: Element, name: str, value: Any, tag: Tag, old: bool) -> None:
     """Set a parameter; without a name it gets one."""
     if not name:
-        name = f"{UNNAMED}{sum(key.startswith(UNNAMED) for key in parent)}"
+        name = f"{UNNAMED}{parent.unnamed}"
+        parent.unnamed += 1
     elif old:
         name = re.sub(r"(?<=[a-z])[A-Z]+", lambda match: "_" + match[0].lower(), name)
     if name in ("type", "id"):

@@ -9,14 +9,14 @@ from typing import Any
 import numpy as np
 
 from ...arrays.elementary import arccos, sin_cos_turns
-from ...arrays.vec import Doubles, cross
+from ...arrays.vec import Doubles, cross, dot, spans
 from ...core.errors import SceneError
 from ...shapes import Group, Mesh, Shape, Sphere
 from ...shapes.transform import EVEN, Matrix
 from ...textures.base import BaseTexture
 from ..conversion import placed, textures_in
 from ..placing import in_range, moved_raw
-from ..repair import RawMesh, build
+from ..repair import AT_ONCE, RawMesh, build
 from ..surfaces import RINGS, SIDES, over_square
 from ..trimesh_import import import_trimesh
 from .entities import Entity, Job, converts, unsupported
@@ -277,8 +277,11 @@ def _facing(raw: RawMesh, reverse: bool) -> RawMesh:
     """Return a mesh whose faces have their fronts where its normals are; `reverse` is ReverseOrientation."""
     faces, normals = raw.faces, raw.normals
     if normals is not None:
-        a, b, c = raw.vertices.T[:, faces.T].swapaxes(0, 1)
-        ahead = (cross(b - a, c - a) * normals.T[:, faces.T].sum(1)).sum(0) >= 0
+        ahead = np.empty(len(faces), np.bool_)
+        for part in spans(len(faces), AT_ONCE):
+            a, b, c = (np.ascontiguousarray(raw.vertices.take(each, 0).T) for each in faces[part].T)
+            mean = normals.take(faces[part], 0).sum(1).T
+            ahead[part] = dot(cross(b - a, c - a), mean) >= 0
         if not ahead.all():
             faces = np.where(ahead[:, None], faces, faces[:, ::-1])
     if reverse:

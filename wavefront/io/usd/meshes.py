@@ -37,8 +37,12 @@ class _Triangles:
 
     def by_point(self, chosen: Any) -> tuple[Any, dict[str, Any]]:
         """Return the same with a vertex for each point that they use."""
-        used, faces = np.unique(self.point[chosen], return_inverse=True)
-        return faces.reshape(-1, 3), {"vertex": used, "varying": used, "constant": np.zeros_like(used)}
+        faces, there = self.point[chosen], np.zeros(len(self.points), np.bool_)
+        there[faces] = True
+        used = np.flatnonzero(there)
+        if len(used) < len(there):
+            faces = (np.cumsum(there) - 1)[faces]
+        return faces, {"vertex": used, "varying": used, "constant": np.zeros_like(used)}
 
 
 class Meshes:
