@@ -29,16 +29,26 @@ def studio() -> wf.Environment:
     return wf.Environment(PRESETS["studio"].pixels().astype(np.float32))
 
 
-def sky() -> wf.Environment:
-    """Return an HDRI of 128x256 pixels: a sky, a dark ground and a soft sun."""
-    up = np.cos((np.arange(128) + 0.5) / 128 * np.pi)[:, None]
-    turn = (0.5 - (np.arange(256) + 0.5) / 256) * 2 * np.pi
-    level = np.sqrt(1 - up**2)
-    directions = np.stack([level * np.sin(turn), up * np.ones(256), level * np.cos(turn)], -1)
-    toward = directions @ (np.array((0.5, 0.6, 0.62)) / np.linalg.norm((0.5, 0.6, 0.62)))
-    color = np.where(up[..., None] > 0, (0.5, 0.7, 1.0), (0.18, 0.15, 0.12)) * np.ones((128, 256, 1))
-    sun = 60 * np.exp(120 * (toward - 1))[..., None] * (1, 0.9, 0.75)
-    return wf.Environment((color + sun).astype(np.float32))
+def sky(kind: str = "soft sun", height: int = 128) -> wf.Environment:
+    """Return an HDRI of one kind, twice as wide as it is high.
+
+    Kinds are "even", but for noise of 5 %; "soft sun", of some degrees in a sky over a dark ground; and "hard
+    sun", a disk of 0.53 degrees, 100 000 times as bright as that sky.
+    """
+    if kind == "even":
+        noise = np.random.default_rng(1).uniform(0.95, 1.05, (height, 2 * height, 1))
+        return wf.Environment((noise * (0.9, 0.95, 1)).astype(np.float32))
+    up = np.cos((np.arange(height) + 0.5) / height * np.pi)[:, None]
+    turn = (0.5 - (np.arange(2 * height) + 0.5) / (2 * height)) * 2 * np.pi
+    x, y, z = np.array((0.5, 0.6, 0.62)) / np.linalg.norm((0.5, 0.6, 0.62))
+    toward = y * up + np.sqrt(1 - up**2) * (x * np.sin(turn) + z * np.cos(turn))
+    suns = {
+        "soft sun": lambda: 60 * np.exp(120 * (toward - 1)),
+        "hard sun": lambda: 1e5 * (toward > np.cos(np.radians(0.533 / 2))),
+    }
+    pixels = suns[kind]().astype(np.float32)[..., None] * np.float32((1, 0.9, 0.75))
+    pixels += np.where(up[..., None] > 0, np.float32((0.5, 0.7, 1.0)), np.float32((0.18, 0.15, 0.12)))
+    return wf.Environment(pixels)
 
 
 def blob(material: wf.Bsdf, center: tuple[float, float, float], subdivisions: int = 6) -> wf.Mesh:

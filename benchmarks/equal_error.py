@@ -144,6 +144,13 @@ def meshes(size: int) -> wf.Scene:
     return mesh_scene(None, size)
 
 
+def hdri(kind: str, size: int) -> wf.Scene:
+    """Return a matte ball and rough gold before an HDRI of 1024x2048 pixels."""
+    from error_vs_time import hdri_scene
+
+    return hdri_scene(size, kind, 1024)
+
+
 def courtyard(size: int) -> wf.Scene:
     """Return the scene of examples/estimators.py."""
     from estimators import courtyard as build
@@ -227,6 +234,7 @@ SCENES: dict[str, Callable[[int], Any]] = {
     "courtyard": courtyard,
     "mesh under sky": mesh_under_sky,
     "metal and glass meshes": meshes,
+    **{f"HDRI, {kind}": partial(hdri, kind) for kind in ("even", "soft sun", "hard sun")},
     **{f"{n} {kind}": partial(lit, kind, n) for kind in ("points", "panels") for n in (10, 1000)},
     **{name: partial(example, name) for name in EXAMPLES},
     **BESIDE_GLOSS,

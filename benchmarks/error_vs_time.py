@@ -128,8 +128,8 @@ def mesh_scene(data: Path | None, size: int) -> wf.Scene:
     return wf.Scene(shapes, [wf.Environment((0.4, 0.45, 0.5))], camera)
 
 
-def hdri_scene(size: int) -> wf.Scene:
-    """Return a matte ball and a torus of rough gold on a floor, before a sky with a soft sun."""
+def hdri_scene(size: int, kind: str = "soft sun", height: int = 128) -> wf.Scene:
+    """Return a matte ball and a torus of rough gold on a floor, before a `sky` of that kind and height."""
     import trimesh
 
     torus = trimesh.creation.torus(0.5, 0.2)
@@ -140,7 +140,7 @@ def hdri_scene(size: int) -> wf.Scene:
         wf.Sphere((-0.7, 0.65, 0), 0.65, material=wf.Diffuse(0.7)),
         wf.Mesh(flat, torus.faces, normals=torus.vertex_normals[:, [1, 2, 0]], material=gold, name="torus"),
     ]
-    return before(size, shapes, sky())
+    return before(size, shapes, sky(kind, height))
 
 
 def ball(subdivisions: int) -> tuple[np.ndarray, np.ndarray]:
