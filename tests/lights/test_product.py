@@ -1,5 +1,7 @@
 """Light samples of environments by light times cosine: densities, means and noise."""
 
+import tracemalloc
+from collections.abc import Callable
 from functools import cache
 
 import numpy as np
@@ -9,7 +11,9 @@ from significance import assert_same_images, repeat
 
 import wavefront as wf
 from wavefront import testing
+from wavefront.accel.numpy_accel import NumpyAccelerator
 from wavefront.arrays.vec import f4
+from wavefront.compile.scene import compile_scene
 from wavefront.lights import EnvironmentSum, LightRecord, Receiver
 from wavefront.lights.product import NO_NORMAL, CosineProduct, octahedral_bins, octahedral_normals
 
@@ -38,6 +42,55 @@ def test_tables_are_made_once_for_an_environment() -> None:
     assert sky.record(np.ones(3)).compensated() is tables
     sky.radiance = np.random.default_rng(2).random((8, 16, 3))
     assert sky.record(np.zeros(3)).compensated() is not tables
+
+
+def memory(make: Callable[[], object]) -> tuple[int, int]:
+    """The bytes that something made keeps, and their peak while it is made."""
+    tracemalloc.start()
+    kept = make()
+    size, peak = tracemalloc.get_traced_memory()
+    tracemalloc.stop()
+    del kept
+    return size, peak
+
+
+def sampled(**options) -> Callable[[], wf.Environment]:
+    """Return what makes an environment and draws light samples for a surface and for none."""
+
+    def make() -> wf.Environment:
+        environment = wf.Environment(**options)
+        record = environment.record(np.zeros(3)).compensated()
+        lit = record.lighting(Receiver(f4([[0], [1], [0]]), np.array([True])))
+        for each in (record, lit):
+            each.pdf_li(np.zeros((3, 1), f4), each.sample_li(np.zeros((3, 1), f4), f4([[0.3], [0.6]])).wi)
+        return environment
+
+    return make
+
+
+def test_bytes_for_each_pixel() -> None:
+    """12 of the image, 4 of densities by light alone, 10 by light times cosine; 12 and 4 of a backdrop."""
+    images = [np.random.default_rng(1).random((height, 2 * height, 3), f4) for height in (256, 512)]
+    more = images[1].size / 3 - images[0].size / 3
+    sampled(radiance=images[0])()
+    (kept, _), (most, peak) = (memory(sampled(radiance=image)) for image in images)
+    assert (most - kept) / more == pytest.approx(26.1, abs=0.2)
+    assert kept - 26.1 * images[0].size / 3 < 1.5e6
+    assert peak < 80 * images[1].size / 3
+    shown, _ = memory(sampled(radiance=images[0], backdrop=images[1]))
+    assert (shown - kept) / (images[1].size / 3) == pytest.approx(16, abs=0.2)
+
+
+def test_without_an_image_no_table_is_made(calls_of) -> None:
+    made = calls_of("wavefront.lights.image.CosineProduct"), calls_of("wavefront.lights.image.Distribution2D")
+    lights = wf.PointLight((0, 3, 0), 5), wf.DirectionalLight((0, -1, 0), 1, angle=3), wf.Environment(0.5)
+    panel = wf.Rectangle((-1, 2, -1), (2, 0, 0), (0, 0, 2), emission=3)
+    for image, tables in ((None, 0), (sky(), 1)):
+        scene = wf.Scene([*scenes.four_materials(), panel], lights)
+        if image is not None:
+            scene.lights = [*lights[:2], wf.Environment(image)]
+        compile_scene(scene, NumpyAccelerator, mis=True)
+        assert [len(calls) for calls in made] == [tables, tables]
 
 
 @pytest.mark.parametrize("shape", [(24, 40), (5, 9), (1, 2), (70, 133)])

@@ -75,16 +75,19 @@ def test_items_are_those_of_a_plain_search(weights, u):
     items = Discrete(weights)
     u = np.float32(u)
     upto = np.cumsum(items.probability)
-    upto[np.flatnonzero(weights)[-1] :] = 1
+    upto /= upto[-1]
     expected = np.searchsorted(upto, u.astype(np.float64), side="right") if len(items) > 1 else 0 * u
     safe = upto.max(initial=0, where=upto < 1) < 1 - 1e-7  # beyond this float32 cannot tell edges from 1
     assert (items.sample(u)[0] == expected).all() or not safe
 
 
 def test_the_rest_stays_below_one():
-    """float32(0.9) is below 0.9 by so little that the ratio rounds to 1."""
-    index, _, rest = Discrete([0.9, 0.1]).sample(np.float32([0.9]))
-    assert index[0] == 0
+    """Both distances from the start of the item, halves of a step of float32, round to the same number."""
+    start, end = 2.0**-25, 0.5 + 3 * 2.0**-24
+    u = np.float32([0.5 + 2.0**-23])
+    index, _, rest = Discrete([start, end - start, 1 - end]).sample(u)
+    assert index[0] == 1
+    assert u - np.float32(start) == np.float32(end) - np.float32(start)
     assert rest[0] == BELOW_ONE
 
 

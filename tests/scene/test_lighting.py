@@ -1,5 +1,6 @@
 """Ready-made light: what a scene without lights looks like, each preset, and the ground."""
 
+import tracemalloc
 import warnings
 
 import numpy as np
@@ -60,6 +61,19 @@ def test_presets_are_prepared_once_and_belong_to_their_caller() -> None:
         assert light.radiance.max() < 1.5
         assert light.backdrop.radiance.max() < 1
         assert light.group != "mine"
+
+
+@pytest.mark.parametrize("preset", LIGHTINGS)
+def test_a_preset_takes_at_most_4_mb(preset: str) -> None:
+    """With the tables that a render makes of it."""
+    lighting._directions.cache_clear()
+    tracemalloc.start()
+    lights = wf.studio(preset, up=(1, 2, 3))
+    shown = [getattr(light, "backdrop", None) or light for light in lights]
+    kept = lights, [light.record(np.zeros(3)).compensated() for light in lights], shown
+    size, _ = tracemalloc.get_traced_memory()
+    tracemalloc.stop()
+    assert size < 4e6, kept
 
 
 def test_three_sides_of_a_cube_can_be_told_apart_and_from_the_background() -> None:

@@ -95,7 +95,8 @@ class Environment(Parametrized, FarLight):
     In Blender the middle is +x, with z up; for a scene that it exported with y up, the same view takes the
     transform [[0, 0, 1], [0, 1, 0], [-1, 0, 0]].
 
-    Directions are sampled by the luminance of the image. That takes about 28 bytes of memory for each pixel.
+    Directions are sampled by the luminance of the image. With the tables for that an image takes 26 bytes of
+    memory for each pixel, and 1.3 MB. A backdrop takes 16 bytes for each pixel.
 
     Raises
     ------

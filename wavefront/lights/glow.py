@@ -31,9 +31,8 @@ class GlowingCells:
         first = media.aim.first[column]
         density = media.aim.values[0, first : first + width * height * depth].astype(np.float64)
         table = (density / density.sum()).reshape(-1, width)
-        chance = table.sum(1)
-        self._rows = Inversion(chance[None])
-        self._columns = Inversion(table / np.where(chance > 0, chance, 1)[:, None])
+        self._rows = Inversion(table.sum(1)[None])
+        self._columns = Inversion(table)
         self._size = np.array([[width], [height], [depth]], f4)
         matrix = media.to_unit[:, column].astype(np.float64)
         self.to_world = np.linalg.inv(matrix[:9].reshape(3, 3))

@@ -12,7 +12,7 @@ import numpy as np
 from ..arrays.elementary import arctan2, sin_cos, sin_cos_turns
 from ..arrays.soa import soa
 from ..arrays.state import SurfaceInteraction
-from ..arrays.vec import INV_PI, INV_TWO_PI, Doubles, Floats, Ints, f4, luminance
+from ..arrays.vec import INV_PI, INV_TWO_PI, Doubles, Floats, Ints, f4, luminance, positive
 from ..codecs.budget import Budget
 from ..codecs.encoding import codes_to_linear
 from ..codecs.images import COLOR_BYTES, read_codes
@@ -68,9 +68,12 @@ class ImageEnvironment(InfiniteLight):
         sin_middle, _ = sin_cos_turns((edges[:-1] + edges[1:]) / (4 * bands))
         sin_half, _ = sin_cos(np.pi * np.diff(edges) / (2 * bands))
         step = 2 * sin_middle * sin_half  # cos of one edge − cos of the next
-        texels = pixels.astype(np.float64) if filter == "nearest" else _spread(pixels, poles)
-        shares = texels * (step / (2 * pixels.shape[1]))[:, None, None]  # of the sphere
-        weights = luminance(np.moveaxis(shares, -1, 0))
+        weights, mean = np.zeros(pixels.shape[:2]), []
+        for channel, part in zip(np.moveaxis(pixels, -1, 0), luminance(np.eye(3)), strict=True):
+            texels = channel if filter == "nearest" else _spread(channel, poles)
+            shares = texels * (step / (2 * pixels.shape[1]))[:, None]  # of the sphere
+            mean.append(shares.sum())
+            weights += part * shares
         if not weights.any():
             raise SceneError("every pixel of the Environment is black; Environment(0) is darkness")
         return cls(
@@ -79,7 +82,7 @@ class ImageEnvironment(InfiniteLight):
             density=(1 / (2 * np.pi * height * step)).astype(f4),
             top=sin_cos_turns(edges[:-1] / (2 * bands))[1],
             step=step,
-            mean=shares.sum((0, 1)).astype(f4).reshape(3, 1),
+            mean=np.array(mean, f4).reshape(3, 1),
             rotation=None if rotation is None else rotation.astype(f4),
             poles=poles,
         )
@@ -95,8 +98,8 @@ class ImageEnvironment(InfiniteLight):
 
     def _compensated(self) -> Self:
         weights = self.texels.weights()  # density over the unit square; 1/(4π) per steradian is the mean
-        excess = np.maximum(weights - 0.5 * len(self.step) * self.step[:, None], 0)
-        share = float(excess.mean())
+        excess = positive(weights - (0.5 * len(self.step) * self.step[:, None]).astype(f4))
+        share = float(excess.mean(dtype=np.float64))
         if share < LEAST_SHARE:
             return replace(self, share=0.0)
         return replace(self, product=CosineProduct(excess, self.rotation), share=share)
@@ -168,7 +171,7 @@ class ImageEnvironment(InfiniteLight):
 
 
 def _spread(pixels: Floats, poles: bool) -> Doubles:
-    """Mean of the bilinear lookup within each texel: its neighbors count ⅛, itself ¾, both ways.
+    """Mean of the bilinear lookup within each texel (H, W): its neighbors count ⅛, itself ¾, both ways.
 
     Half a texel at a pole has the weights of a whole one between equal rows. The mean is positive wherever
     the lookup is.
@@ -237,4 +240,4 @@ def _without_negative(name: str, pixels: Floats) -> Floats:
             f"{name}: {plural(len(bad), 'negative pixel counts', 'negative pixels count')} as 0, "
             f"first: row {row}, column {column}, {pixels[row, column].tolist()}"
         )
-    return np.maximum(pixels, f4(0))
+    return np.maximum(pixels, f4(0), out=pixels)

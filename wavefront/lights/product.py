@@ -27,14 +27,13 @@ class CosineProduct:
     Parameters
     ----------
     light
-        (H, W) part of the light of each texel; an equirectangular image, top row first.
+        (H, W) in proportion to the light of each texel; an equirectangular image, top row first. It is kept.
     rotation
         (3, 3) to world from the image; None where they are the same.
     """
 
-    def __init__(self, light: Doubles, rotation: Floats | None) -> None:
+    def __init__(self, light: Floats, rotation: Floats | None) -> None:
         self.shape = height, width = light.shape
-        light = light / light.sum()
         rows, columns = min(CELLS[0], height), min(CELLS[1], width)
         self._row_edges = np.arange(rows + 1) * height // rows
         self._column_edges = np.arange(columns + 1) * width // columns
@@ -45,9 +44,9 @@ class CosineProduct:
         if rotation is not None:
             middle = np.stack([sum(row[k] * middle[k] for k in range(3)) for row in rotation.astype(float)])
         self._choose_cells(mass, middle)
-        self._choose_texels(light, mass)
+        self._choose_texels(light)
 
-    def _cell_light(self, light: Doubles) -> tuple[Doubles, Doubles]:
+    def _cell_light(self, light: Floats) -> tuple[Doubles, Doubles]:
         """Return the light of cells (rows, columns), and their mean directions (3, rows, columns)."""
         height, width = self.shape
         sin_theta, cos_theta = sin_cos_turns((np.arange(height) + 0.5) / (2 * height))
@@ -62,7 +61,9 @@ class CosineProduct:
                 (middle[2], cos_phi, sin_theta),
             ):
                 part = band if level is None else band * level[start:stop, None]
-                part = part.sum(0) if factor is None else part.sum(0) * factor
+                part = part.sum(0, dtype=np.float64)
+                if factor is not None:
+                    part *= factor
                 out[row] = np.add.reduceat(part, self._column_edges[:-1])
         return mass, np.divide(middle, mass, out=np.zeros_like(middle), where=mass > 0)
 
@@ -72,29 +73,26 @@ class CosineProduct:
         weight = mass * np.maximum((cos + MARGIN) / (1 + MARGIN), 0)
         total = weight.sum((1, 2), keepdims=True)
         weight = (1 - PLAIN) * np.divide(weight, total, out=np.zeros_like(weight), where=total > 0)
-        weight += (1 - weight.sum((1, 2), keepdims=True)) * mass
-        weight = np.concatenate([weight, mass[None]])
-        rows = weight.sum(2)
-        self._rows = Inversion(rows)
-        columns = np.divide(weight, rows[..., None], out=np.zeros_like(weight), where=rows[..., None] > 0)
-        self._columns = Inversion(columns.reshape(-1, self._cells[1]), 1)
-        self._chance = weight.astype(f4).ravel()
-
-    def _choose_texels(self, light: Doubles, mass: Doubles) -> None:
+        weight += (1 - weight.sum((1, 2), keepdims=True)) * (mass / mass.sum())
+        weight = np.concatenate([weight, (mass / mass.sum())[None]])
+        self._rows = Inversion(weight.sum(2))
+        self._columns = Inversion(weight.reshape(-1, self._cells[1]), 1)
         height, width = self.shape
-        rows, columns = self._cells
-        of_row = np.add.reduceat(light, self._column_edges[:-1], axis=1)  # (H, columns)
+        weight *= np.divide(height * width, mass, out=np.zeros_like(mass), where=mass > 0)
+        self._density = weight.astype(f4).ravel()  # of a texel over its light
+
+    def _choose_texels(self, light: Floats) -> None:
+        (rows, columns), height = self._cells, len(light)
+        of_row = np.add.reduceat(light, self._column_edges[:-1], axis=1, dtype=np.float64)  # (H, columns)
         within = np.zeros((rows, columns, np.diff(self._row_edges).max()))
         for row, (start, stop) in enumerate(zip(self._row_edges, self._row_edges[1:], strict=False)):
             within[row, :, : stop - start] = of_row[start:stop].T
-        self._texel_rows = Inversion(_rows_of_one(within.reshape(rows * columns, -1)), 2)
-        within = np.zeros((height, columns, np.diff(self._column_edges).max()))
+        self._texel_rows = Inversion(within.reshape(rows * columns, -1), 2)
+        within = np.zeros((height, columns, np.diff(self._column_edges).max()), f4)
         for column, (start, stop) in enumerate(zip(self._column_edges, self._column_edges[1:], strict=False)):
             within[:, column, : stop - start] = light[:, start:stop]
-        self._texel_columns = Inversion(_rows_of_one(within.reshape(height * columns, -1)), 2)
-        cell = mass[self._cell_row][:, self._cell_column]
-        density = np.divide(light, cell, out=np.zeros_like(light), where=cell > 0) * (height * width)
-        self._density = density.astype(f4).ravel()
+        self._texel_columns = Inversion(within.reshape(height * columns, -1), 2)
+        self._light = light.astype(f4, copy=False).ravel()
 
     def sample(self, u: Floats, normal: Ints) -> tuple[Floats, Floats, Floats]:
         """Return points x, y (n,) in [0, 1) of the image, and their density (n,) over the unit square.
@@ -110,7 +108,7 @@ class CosineProduct:
         flat, v = self._rows.find(u[1], normal)
         row = flat - normal * rows
         cell, x = self._columns.find(u[0], flat)
-        chance = take(self._chance, cell)
+        density = take(self._density, cell)
         column = cell - flat * columns
         of = row * columns + column
         flat, v = self._texel_rows.find(v, of)
@@ -118,7 +116,7 @@ class CosineProduct:
         of = texel_row * columns + column
         flat, x = self._texel_columns.find(x, of)
         texel_column = flat - of * self._texel_columns.items + take(self._column_edges, column)
-        pdf = chance * take(self._density, texel_row * width + texel_column)
+        pdf = density * take(self._light, texel_row * width + texel_column)
         return within_cell(texel_column, x, width), within_cell(texel_row, v, height), pdf
 
     def pdf(self, x: Floats, y: Floats, normal: Ints) -> Floats:
@@ -127,13 +125,7 @@ class CosineProduct:
         column = np.clip((x * f4(width)).astype(np.intp), 0, width - 1)
         row = np.clip((y * f4(height)).astype(np.intp), 0, height - 1)
         cell = (normal * rows + take(self._cell_row, row)) * columns + take(self._cell_column, column)
-        return take(self._chance, cell) * take(self._density, row * width + column)
-
-
-def _rows_of_one(weights: Doubles) -> Doubles:
-    """Return rows that each sum to 1, or are all 0."""
-    total = weights.sum(1, keepdims=True)
-    return np.divide(weights, total, out=weights, where=total > 0)
+        return take(self._density, cell) * take(self._light, row * width + column)
 
 
 def octahedral_normals() -> Doubles:

@@ -5,6 +5,8 @@ Inversion is monotone in u, so stratified numbers stay stratified.
 
 from __future__ import annotations
 
+from functools import cached_property
+
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
@@ -13,6 +15,7 @@ from ..core.errors import SceneError
 from ..core.plural import plural
 
 _LARGE = 1 << 19  # tables of more items get fewer cells per item, to save memory
+_PART = 1 << 18  # items that are summed at a time, so that sums take little memory
 
 
 def _checked(name: str, weights: ArrayLike, ndim: int) -> Doubles:
@@ -42,26 +45,28 @@ class Inversion:
 
     Parameters
     ----------
-    probability
-        (rows, k): each row sums to 1, or is all 0 and never searched.
+    weights
+        (rows, k), at least 0, in proportion to the probabilities within each row. Rows of zeros are never
+        searched.
     cells_per_item
         Cells of the guide table for each item; by default 8, and 1 in large tables.
     """
 
-    def __init__(self, probability: Doubles, cells_per_item: int | None = None) -> None:
-        rows, self.items = probability.shape
-        items = self.items
-        self._probability = probability.ravel().astype(f4)
-        upto = np.cumsum(probability, axis=1)
-        self._start = (upto - probability).ravel().astype(f4)
-        # A float32 edge that is rounded up separates float32 numbers exactly as the float64 sum does. The
-        # last one of a row becomes 1 in spite of rounding errors.
-        edge = rounded_up(upto)
-        self._edge = edge.ravel()
+    def __init__(self, weights: NDArray[np.floating], cells_per_item: int | None = None) -> None:
+        rows, self.items = weights.shape
         if cells_per_item is None:
-            cells_per_item = 8 if rows * items <= _LARGE else 1
-        self._cells = 1 << (cells_per_item * items - 1).bit_length()
-        self._first = _first_items(edge, self._cells)
+            cells_per_item = 8 if weights.size <= _LARGE else 1
+        self._cells = 1 << (cells_per_item * self.items - 1).bit_length()
+        edge = np.empty((rows, self.items), f4)
+        first = np.empty((rows, self._cells), np.min_scalar_type(self.items - 1))
+        step = max(1, _PART // self.items)
+        for part in (slice(start, start + step) for start in range(0, rows, step)):
+            upto = np.cumsum(weights[part], axis=1, dtype=np.float64)
+            upto /= np.where(upto[:, -1:] > 0, upto[:, -1:], 1)
+            # A float32 edge that is rounded up separates float32 numbers exactly as the float64 sum does.
+            edge[part] = _rounded_up(upto)
+            first[part] = _first_items(edge[part], self._cells)
+        self._edge, self._first = edge.ravel(), first.ravel()
 
     def find(self, u: Floats, row: Ints | None = None) -> tuple[Ints, Floats]:
         """Return the items for u (n,) in [0, 1), of rows `row` (n,), by default of the first row.
@@ -74,17 +79,20 @@ class Inversion:
             (n,) position of u within the item's interval, in [0, 1).
         """
         cell = (u * f4(self._cells)).astype(np.intp)
-        if row is not None:
-            cell += row * self._cells
-        flat = take(self._first, cell).astype(np.intp)
+        if row is None:
+            flat = take(self._first, cell).astype(np.intp)
+        else:
+            flat = take(self._first, cell + row * self._cells) + row * self.items
         short = np.flatnonzero(take(self._edge, flat) <= u)
         for _ in range(2):  # most lanes end after one or two steps
             flat[short] += 1
             short = short[self._edge.take(flat[short]) <= u[short]]
         if len(short):
             flat[short] = self._searched(flat[short], u[short])
-        rest = (u - take(self._start, flat)) / take(self._probability, flat)
-        return flat, np.clip(rest, f4(0), BELOW_ONE)
+        before = take(self._edge, flat - 1)  # beyond u, or 0, at the end of another row
+        start = np.where(before > u, f4(0), before)
+        rest = (u - start) / (take(self._edge, flat) - start)
+        return flat, np.minimum(rest, BELOW_ONE)
 
     def _searched(self, low: Ints, u: Floats) -> Ints:
         """Return the items (n,) for u (n,) by bisection, from items `low` (n,) of the same rows on."""
@@ -96,21 +104,20 @@ class Inversion:
         return high
 
 
-def rounded_up(x: Doubles) -> Floats:
-    """Return the smallest float32 that is not below x, at most 1."""
-    near = np.minimum(x, 1).astype(f4)
+def _rounded_up(x: Doubles) -> Floats:
+    """Return the smallest float32 that is not below x, which is at most 1."""
+    near = x.astype(f4)
     np.nextafter(near, f4(2), out=near, where=near < x)
-    return np.minimum(near, f4(1), out=near)
+    return near
 
 
-def _first_items(edge: Floats, cells: int) -> NDArray[np.int32]:
-    """Return the flat index of the first item that ends beyond c/cells, for each row and cell c."""
-    rows, items = edge.shape
+def _first_items(edge: Floats, cells: int) -> Ints:
+    """Return the number (rows, cells) of the first item that ends beyond c/cells, for each row and cell c."""
+    rows = len(edge)
     ends = np.ceil(edge * f4(cells)).astype(np.intp)  # exact: cells is a power of two
     ends += np.arange(rows)[:, None] * (cells + 1)
     counts = np.bincount(ends.ravel(), minlength=rows * (cells + 1)).reshape(rows, cells + 1)
-    first = np.cumsum(counts, axis=1)[:, :cells] + np.arange(rows)[:, None] * items
-    return first.astype(np.int32).ravel()
+    return np.cumsum(counts, axis=1)[:, :cells]
 
 
 class Discrete:
@@ -158,7 +165,8 @@ class Discrete:
 class Distribution2D:
     """Density over the unit square, constant within each cell of a grid of weights (rows, columns).
 
-    x runs along columns, y along rows. A row is chosen first, then a column within it.
+    x runs along columns, y along rows. A row is chosen first, then a column within it. Tables for samples are
+    made for the first of them: densities alone take 4 bytes for each cell.
 
     Raises
     ------
@@ -168,12 +176,18 @@ class Distribution2D:
 
     def __init__(self, weights: ArrayLike) -> None:
         array = _checked("weights", weights, 2)
-        array = array / array.max()
         self.shape = array.shape
-        self._rows = Discrete(array.sum(axis=1))
-        total = array.sum(axis=1, keepdims=True)
-        self._columns = Inversion(np.divide(array, total, out=np.zeros_like(array), where=total > 0))
-        self._density = (array / array.mean()).astype(f4).ravel()
+        density = array / array.max()
+        density /= density.mean()
+        self._density = density.astype(f4).ravel()
+
+    @cached_property
+    def _rows(self) -> Discrete:
+        return Discrete(self.weights().sum(axis=1, dtype=np.float64))
+
+    @cached_property
+    def _columns(self) -> Inversion:
+        return Inversion(self.weights())
 
     def sample(self, u: Floats) -> tuple[Floats, Floats, Floats]:
         """Return points for u (2, n): u[0] selects x, u[1] selects y.
@@ -192,9 +206,9 @@ class Distribution2D:
         y = within_cell(row, rest_y, height)
         return x, y, self._density.take(flat)
 
-    def weights(self) -> Doubles:
+    def weights(self) -> Floats:
         """Return the density of each cell over the unit square, (rows, columns); their mean is 1."""
-        return self._density.reshape(self.shape).astype(np.float64)
+        return self._density.reshape(self.shape)
 
     def pdf(self, x: Floats, y: Floats) -> Floats:
         """Return the density over the unit square, (n,), at x, y (n,) in [0, 1]."""
