@@ -457,6 +457,28 @@ def test_light_from_all_around_takes_no_light_samples_beside_bsdf_samples(radian
             assert image.rgb == pytest.approx(np.full((8, 8, 3), expected), rel=1e-5)
 
 
+def gradient(contrast: float) -> np.ndarray:
+    """Radiance that rises by `contrast` either way of its mean, to the poles: contrast²/3 of variance."""
+    up = np.cos(np.pi * (np.arange(32) + 0.5) / 32)
+    return np.broadcast_to(1 + contrast * up[:, None, None], (32, 64, 3))
+
+
+@pytest.mark.parametrize(
+    ("image", "drawn"),
+    [
+        (1 + 0.1 * noise(32, 64), False),
+        (gradient(0.5), False),
+        (gradient(0.6), True),
+        (np.where(np.arange(128) == 40, 6, 1)[:, None] * np.ones((64, 128, 3)), True),
+    ],
+    ids=["noise", "weak gradient", "gradient", "a bright line of 4 % of the light"],
+)
+def test_an_image_that_varies_little_takes_no_light_samples_beside_bsdf_samples(image, drawn) -> None:
+    """A tenth of its squared mean is what counts as little, wherever it is and however it is turned."""
+    record = wf.Environment(image * 7, transform=turn(0.3, 0.8)).record(ORIGIN)
+    assert (record.compensated().power(1.0) > 0).tolist() == [drawn]
+
+
 def radiance_of(radiance) -> float:
     """The one value of a radiance."""
     return float(np.ravel(radiance)[0])

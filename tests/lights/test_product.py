@@ -70,7 +70,7 @@ def sampled(**options) -> Callable[[], wf.Environment]:
 
 def test_bytes_for_each_pixel() -> None:
     """12 of the image, 4 of densities by light alone, 10 by light times cosine; 12 and 4 of a backdrop."""
-    images = [np.random.default_rng(1).random((height, 2 * height, 3), f4) for height in (256, 512)]
+    images = [np.random.default_rng(1).random((height, 2 * height, 3), f4) ** 4 for height in (256, 512)]
     more = images[1].size / 3 - images[0].size / 3
     sampled(radiance=images[0])()
     (kept, _), (most, peak) = (memory(sampled(radiance=image)) for image in images)

@@ -25,7 +25,7 @@ from .base import LightSample, Receiver
 from .infinite import InfiniteLight, at_infinity, through_scene, turned
 from .product import NO_NORMAL, CosineProduct, octahedral_bins
 
-LEAST_SHARE = 1e-3  # of the light of an image that is worth light samples
+LEAST_VARIANCE = 0.1  # of radiance over its squared mean, all around, that is worth light samples
 
 
 @soa
@@ -90,18 +90,19 @@ class ImageEnvironment(InfiniteLight):
     def compensated(self) -> Self:
         """Draw directions by how much brighter than the mean they are, and leave the rest to BSDF samples.
 
-        In an image that is nearly the same all around, nothing is left to draw. The tables are made once.
+        An image that is nearly the same all around is left to BSDF samples. The tables are made once.
         """
         if self.made is None:
             self.made = self._compensated()
         return self.made
 
     def _compensated(self) -> Self:
-        weights = self.texels.weights()  # density over the unit square; 1/(4π) per steradian is the mean
-        excess = positive(weights - (0.5 * len(self.step) * self.step[:, None]).astype(f4))
-        share = float(excess.mean(dtype=np.float64))
-        if share < LEAST_SHARE:
+        uniform = (0.5 * len(self.step) * self.step[:, None]).astype(f4)  # 1/(4π) per steradian
+        more = self.texels.weights() - uniform  # density over the unit square
+        if (more * more / uniform).mean(dtype=np.float64) < LEAST_VARIANCE:
             return replace(self, share=0.0)
+        excess = positive(more)
+        share = float(excess.mean(dtype=np.float64))
         return replace(self, product=CosineProduct(excess, self.rotation), share=share)
 
     def sample_li(self, point: Floats, u: Floats) -> LightSample:

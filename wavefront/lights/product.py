@@ -70,9 +70,11 @@ class CosineProduct:
     def _choose_cells(self, mass: Doubles, middle: Doubles) -> None:
         x, y, z = octahedral_normals()[:, :, None, None]
         cos = x * middle[0] + y * middle[1] + z * middle[2]  # (normals, rows, columns)
-        weight = mass * np.maximum((cos + MARGIN) / (1 + MARGIN), 0)
+        cos += MARGIN
+        weight = np.maximum(cos, 0, out=cos)
+        weight *= mass
         total = weight.sum((1, 2), keepdims=True)
-        weight = (1 - PLAIN) * np.divide(weight, total, out=np.zeros_like(weight), where=total > 0)
+        weight *= np.divide(1 - PLAIN, total, out=np.zeros_like(total), where=total > 0)
         weight += (1 - weight.sum((1, 2), keepdims=True)) * (mass / mass.sum())
         weight = np.concatenate([weight, (mass / mass.sum())[None]])
         self._rows = Inversion(weight.sum(2))

@@ -15,7 +15,7 @@ from ..core.errors import SceneError
 from ..core.plural import plural
 
 _LARGE = 1 << 19  # tables of more items get fewer cells per item, to save memory
-_PART = 1 << 18  # items that are summed at a time, so that sums take little memory
+_PART = 1 << 14  # items that are summed at a time, so that sums take little memory, and no fresh one
 
 
 def _checked(name: str, weights: ArrayLike, ndim: int) -> Doubles:
