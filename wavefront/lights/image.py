@@ -224,8 +224,9 @@ def environment_pixels(source: Any) -> Floats:
 
 
 def _check_finite(name: str, pixels: Floats) -> None:
-    bad = np.argwhere(~np.isfinite(pixels).all(2))
-    if len(bad):
+    finite = np.isfinite(pixels)
+    if not finite.all():
+        bad = np.argwhere(~finite.all(2))
         row, column = bad[0]
         raise SceneError(
             f"{name}: {plural(len(bad), 'pixel is', 'pixels are')} not finite in float32, "
@@ -234,8 +235,8 @@ def _check_finite(name: str, pixels: Floats) -> None:
 
 
 def _without_negative(name: str, pixels: Floats) -> Floats:
-    bad = np.argwhere((pixels < 0).any(2))
-    if len(bad):
+    if pixels.min(initial=0) < 0:
+        bad = np.argwhere((pixels < 0).any(2))
         row, column = bad[0]
         warn_caller(
             f"{name}: {plural(len(bad), 'negative pixel counts', 'negative pixels count')} as 0, "

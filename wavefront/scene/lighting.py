@@ -62,14 +62,17 @@ class SoftBox:
 
 @soa
 class Preset:
-    """A gradient from bottom to top, and soft boxes."""
+    """A gradient from bottom to top, and soft boxes, which are above the horizon."""
 
     gradient: tuple[tuple[float, float], ...]  # sine of the elevation, rising; radiance, W·sr⁻¹·m⁻²
     boxes: tuple[SoftBox, ...] = ()
 
     def pixels(self) -> Doubles:
         """Return the image (H, W, 3) of the environment, as `Environment` lays it out."""
-        return sum((box.radiance_at(_directions()) for box in self.boxes), self.backdrop())
+        image = self.backdrop()
+        for box in self.boxes:
+            image[: HEIGHT // 2] += box.radiance_at(_directions()[:, : HEIGHT // 2])
+        return image
 
     def backdrop(self) -> Doubles:
         """Return the same without the boxes, which a camera does not see."""
