@@ -1,40 +1,53 @@
-"""Compare `wf.OpenPBR` with Adobe's reference, compiled here: f and pdf of random pairs of directions.
+"""Compare `wf.OpenPBR` with Adobe's reference, compiled here: f and pdf of pairs of directions.
 
     python benchmarks/openpbr_vs_reference.py OPENPBR_BSDF GLM
 
 with the folders of github.com/adobe/openpbr-bsdf and github.com/g-truc/glm. It needs g++ and prints for each
-lobe the mean value of the reference, and the differences of the albedo and of f·cosθ from it.
+lobe the albedos, and the differences of f·cosθ and of the density. A film is compared with the mean of the
+reference over wavelengths, by the matching functions that the film here stands for.
 """
 
 import subprocess
 import sys
 import tempfile
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 
 from wavefront.bsdfs.openpbr import OpenPBRBsdf
+from wavefront.bsdfs.thin_film import GAUSSIANS, SHARES
 
 PROGRAM = """
 #include <glm/glm.hpp>
-#define OPENPBR_RECIPROCAL_COAT_AND_FUZZ %d
 #include "openpbr.h"
 #include <cstdio>
-int main() {
+#include <cstdlib>
+#include <vector>
+int main(int, char** argv) {
     OpenPBR_ResolvedInputs inputs = openpbr_make_default_resolved_inputs();
-    %s
+    switch (atoi(argv[1])) {%s}
+    std::vector<float> waves(6 * atoi(argv[2]));
+    fread(waves.data(), 4, waves.size(), stdin);
     float x[6];
     while (fread(x, 4, 6, stdin) == 6) {
         const vec3 wo(x[0], x[1], x[2]), wi(x[3], x[4], x[5]);
-        const OpenPBR_PreparedBsdf bsdf = openpbr_prepare(
-            inputs, vec3(1.0f), OpenPBR_BaseRgbWavelengths_nm, OpenPBR_VacuumIor, wo);
-        const vec3 f = openpbr_get_sum_of_diffuse_specular(openpbr_eval(bsdf, wi));
-        float out[4] = {f.x, f.y, f.z, openpbr_pdf(bsdf, wi)};
+        vec3 f(0.0f);
+        float pdf = 0.0f;
+        for (size_t k = 0; k < waves.size(); k += 6) {
+            const OpenPBR_PreparedBsdf bsdf = openpbr_prepare(
+                inputs, vec3(1.0f), vec3(waves[k], waves[k + 1], waves[k + 2]), OpenPBR_VacuumIor, wo);
+            f += openpbr_get_sum_of_diffuse_specular(openpbr_eval(bsdf, wi))
+                * vec3(waves[k + 3], waves[k + 4], waves[k + 5]);
+            pdf = openpbr_pdf(bsdf, wi);
+        }
+        float out[4] = {f.x, f.y, f.z, pdf};
         fwrite(out, 4, 4, stdout);
     }
 }
 """
-RED, WHITE = (0.8, 0.3, 0.1), (1.0, 1.0, 1.0)
+RED = (0.8, 0.3, 0.1)
+SPREAD = 1.1673039782614187  # x⁵ = x + 1: powers of 1/x spread evenly in four dimensions (M. Roberts)
 NO_GLOSS = {"specular_weight": 0.0}
 LOBES = {
     "diffuse": {"base_color": RED, **NO_GLOSS},
@@ -48,6 +61,13 @@ LOBES = {
     "clear": {"transmission_weight": 1.0, "specular_roughness": 0.4},
     "sheet": {"transmission_weight": 1.0, "specular_roughness": 0.4, "geometry_thin_walled": True},
     "film on metal": {"base_color": RED, "base_metalness": 1.0, "thin_film_weight": 1.0},
+    "film on tinted metal": {
+        "base_color": RED,
+        "base_metalness": 1.0,
+        "specular_color": (0.9, 0.7, 0.5),
+        "thin_film_weight": 1.0,
+    },
+    "film on gloss": {"base_color": (0.0, 0.0, 0.0), "specular_roughness": 0.4, "thin_film_weight": 1.0},
     "coat": {"base_color": (0.0, 0.0, 0.0), "coat_weight": 1.0, "coat_roughness": 0.4, **NO_GLOSS},
     "coat over diffuse": {"base_color": RED, "coat_weight": 1.0, "coat_roughness": 0.4, **NO_GLOSS},
     "coat, undarkened": {
@@ -65,8 +85,21 @@ LOBES = {
         **NO_GLOSS,
     },
     "fuzz": {"base_color": (0.0, 0.0, 0.0), "fuzz_weight": 1.0, **NO_GLOSS},
+    "fuzz, rough 0.2": {"base_color": (0.0, 0.0, 0.0), "fuzz_weight": 1.0, "fuzz_roughness": 0.2, **NO_GLOSS},
+    "fuzz, rough 0.8": {"base_color": (0.0, 0.0, 0.0), "fuzz_weight": 1.0, "fuzz_roughness": 0.8, **NO_GLOSS},
     "fuzz over diffuse": {"base_color": RED, "fuzz_weight": 1.0, **NO_GLOSS},
 }
+
+
+class Row(NamedTuple):
+    """One lobe beside the reference."""
+
+    lobe: str
+    reference: float  # albedo for uniform light
+    albedo: float
+    difference: float  # mean |Δf·cosθ| over the mean of f·cosθ
+    median: float  # of |Δf|/f
+    density: float  # median ratio of the densities
 
 
 def assignments(parameters: dict) -> str:
@@ -80,51 +113,92 @@ def assignments(parameters: dict) -> str:
     return " ".join(f"inputs.{name} = {text(value)};" for name, value in parameters.items())
 
 
-def directions(rng: np.random.Generator, n: int, below: bool) -> np.ndarray:
-    """Return random directions (3, n), uniform in solid angle."""
-    z = rng.uniform(-1 if below else 0.02, 1, n)
-    turn = rng.uniform(0, 2 * np.pi, n)
-    r = np.sqrt(1 - z * z)
-    return np.stack([r * np.cos(turn), r * np.sin(turn), z]).astype(np.float32)
+def built(reference: str, glm: str, folder: str) -> list[Path]:
+    """Return the programs with the weights of layers by the view alone, and by both directions."""
+    cases = " ".join(f"case {k}: {assignments(lobe)} break;" for k, lobe in enumerate(LOBES.values()))
+    source = Path(folder, "compare.cpp")
+    source.write_text(PROGRAM % cases)
+    programs = [Path(folder, f"compare{reciprocal}") for reciprocal in (0, 1)]
+    for reciprocal, program in enumerate(programs):
+        macro = f"-DOPENPBR_RECIPROCAL_COAT_AND_FUZZ={reciprocal}"
+        command = [
+            "g++",
+            "-O1",
+            "-w",
+            "-std=c++17",
+            macro,
+            f"-I{reference}",
+            f"-I{glm}",
+            source,
+            "-o",
+            program,
+        ]
+        subprocess.run(command, check=True)
+    return programs
 
 
-def main(reference: str, glm: str, n: int = 20_000) -> None:
+def wavelengths(parameters: dict) -> np.ndarray:
+    """Return wavelengths of the channels, in nanometers, and their weights, (k, 6)."""
+    if "thin_film_weight" not in parameters:
+        return np.array([[620, 540, 450, 1, 1, 1]], np.float32)
+    wave = np.linspace(1.2e6, 2.8e6, 49)
+    density = np.zeros((3, wave.size))
+    for function, amplitude, center, variance in GAUSSIANS:
+        density[function] += amplitude * np.exp(-((wave - center) ** 2) / (4 * variance))
+    weight = SHARES @ (density / density.sum(1, keepdims=True))
+    return np.concatenate([np.repeat(1e9 / wave[None], 3, 0), weight]).T.astype(np.float32)
+
+
+def pairs(n: int, below: bool) -> tuple[np.ndarray, np.ndarray]:
+    """Return two sets of directions (3, n), uniform in solid angle; wi also below the surface."""
+
+    def direction(z: np.ndarray, turn: np.ndarray) -> np.ndarray:
+        r, angle = np.sqrt(1 - z * z), 2 * np.pi * turn
+        return np.stack([r * np.cos(angle), r * np.sin(angle), z]).astype(np.float32)
+
+    x, y, z, w = np.arange(n) * SPREAD ** -np.arange(1.0, 5.0)[:, None] % 1
+    least = -1 if below else 0.02
+    return direction(0.02 + 0.98 * x, y), direction(least + (1 - least) * z, w)
+
+
+def compared(name: str, programs: list[Path], n: int = 60_000) -> Row:
+    """Compare a lobe at n pairs of directions."""
+    parameters = LOBES[name]
+    bsdf, waves = OpenPBRBsdf(**parameters), wavelengths(parameters)
+    wo, wi = pairs(n, bsdf.transmissive)
+    command = [programs["fuzz_weight" not in parameters], str(list(LOBES).index(name)), str(len(waves))]
+    data = waves.tobytes() + np.ascontiguousarray(np.concatenate([wo, wi]).T).tobytes()
+    out = subprocess.run(command, input=data, check=True, capture_output=True).stdout
+    *theirs, density = np.frombuffer(out, np.float32).reshape(n, 4).T
+    f, pdf = bsdf.evaluate(wo, wi)
+    if bsdf.transmissive and not bsdf.thin:
+        f = np.where(wi[2] < 0, f * np.float32(1.5**2), f)  # theirs does not scale radiance
+    f = f * np.abs(wi[2])
+    area = 4 * np.pi if bsdf.transmissive else 2 * np.pi
+    gap, seen = np.abs(f - theirs).mean(0), np.mean(theirs, 0)
+    lit = seen > 1e-4
+    return Row(
+        name,
+        float(seen.mean() * area),
+        float(f.mean() * area),
+        float(gap.mean() / seen.mean()),
+        float(np.median(gap[lit] / seen[lit])),
+        float(np.median(pdf[lit] / density[lit])),
+    )
+
+
+def main(reference: str, glm: str) -> None:
     """Print the table."""
-    rng = np.random.default_rng(0)
     print(
         f"{'lobe':20} {'albedo':>8} {'ours':>8} {'|Δf|/mean f':>12} {'median |Δf|/f':>14} {'pdf ratio':>10}"
     )
     with tempfile.TemporaryDirectory() as folder:
-        for name, parameters in LOBES.items():
-            source, binary = Path(folder, "compare.cpp"), Path(folder, "compare")
-            source.write_text(PROGRAM % (1, assignments(parameters)))
-            command = [
-                "g++",
-                "-O1",
-                "-std=c++17",
-                f"-I{reference}",
-                f"-I{glm}",
-                str(source),
-                "-o",
-                str(binary),
-            ]
-            subprocess.run(command, check=True, stderr=subprocess.DEVNULL)
-            bsdf = OpenPBRBsdf(**parameters)
-            wo, wi = directions(rng, n, False), directions(rng, n, bsdf.transmissive)
-            pairs = np.ascontiguousarray(np.concatenate([wo, wi]).T).tobytes()
-            out = subprocess.run([binary], input=pairs, check=True, capture_output=True).stdout
-            theirs = np.frombuffer(out, np.float32).reshape(n, 4).T
-            f, pdf = bsdf.evaluate(wo, wi)
-            if bsdf.transmissive and not bsdf.thin:
-                f = np.where(wi[2] < 0, f * np.float32(1.5**2), f)  # theirs does not scale radiance
-            f = f * np.abs(wi[2])
-            area = 4 * np.pi if bsdf.transmissive else 2 * np.pi
-            seen, lit = theirs[:3].mean(0), theirs[:3].mean(0) > 1e-4
-            gap = np.abs(f - theirs[:3]).mean(0)
+        programs = built(reference, glm, folder)
+        for name in LOBES:
+            row = compared(name, programs)
             print(
-                f"{name:20} {seen.mean() * area:8.4f} {f.mean() * area:8.4f} "
-                f"{gap.mean() / seen.mean():12.2%} "
-                f"{np.median(gap[lit] / seen[lit]):14.2%} {np.median(pdf[lit] / theirs[3][lit]):10.3f}"
+                f"{name:20} {row.reference:8.4f} {row.albedo:8.4f} {row.difference:12.2%} {row.median:14.2%} "
+                f"{row.density:10.3f}"
             )
 
 
