@@ -34,6 +34,7 @@ from wavefront.bsdfs import (
     ThinDielectric,
     ThinDisney,
 )
+from wavefront.bsdfs.fuzz import _transformation
 from wavefront.bsdfs.measured import UP, _coordinates, _elevation, _turned
 from wavefront.bsdfs.microfacet import Facets, alpha_of
 from wavefront.bsdfs.rough import Microfacets
@@ -114,6 +115,7 @@ KINDS = {
         coat_weight=st.just(0.0) | part,
         coat_roughness=rough,
         fuzz_weight=st.just(0.0) | part,
+        fuzz_roughness=rough,
     ),
     Disney: st.builds(
         Disney, color, rough, part, anisotropic=part, ior=st.floats(1.1, 2), transmission=st.just(0.0) | part
@@ -231,6 +233,10 @@ def preimages(bsdf: Bsdf, wo: np.ndarray, wi: np.ndarray, inside: bool) -> list[
     found += [unstretched_inverse(wi, facets) for facets in facets_of(bound_to(bsdf, wo, inside))]
     if isinstance(bsdf, Measured):
         found.append(tables_inverse(bsdf, wo, wi))
+    if isinstance(bsdf, OpenPBRBsdf) and bsdf.fuzz_weight[0] > 0:
+        a, b = (np.ravel(each)[0] for each in _transformation(wo[2], bsdf.fuzz_roughness.astype(float)))
+        below = columns(*(a * wi[:2, 0] + b * wo[:2, 0] * wi[2, 0]), wi[2, 0])
+        found.append(cosine_hemisphere_inverse(below / np.linalg.norm(below)))
     halves = [wo + wi, wo + wi * columns(1, 1, -1)]
     halves += [wo + eta * wi for eta in indices_of(bsdf, inside)]
     for half in halves:

@@ -14,7 +14,7 @@ import numpy as np
 
 from ..arrays.elementary import exp, log
 from ..arrays.state import SurfaceInteraction
-from ..arrays.vec import INV_PI, TINY, Floats, f4
+from ..arrays.vec import INV_PI, TINY, Bools, Floats, f4
 from ..core.parameter import Parameter, flag, parametrized
 from ..textures.base import BaseTexture
 from ..textures.parameter import Color, Scalar, color, refractive_index, scalar
@@ -22,11 +22,11 @@ from .albedo import dielectric_albedo
 from .base import BsdfSample, JointBsdf
 from .energy import Shape, mean_over_cosines
 from .fresnel import fresnel_dielectric
+from .fuzz import fuzz_albedo, fuzz_directions, fuzz_lobe
 from .microfacet import Facets, alpha_of
 from .oren_nayar import OrenNayar
-from .principled import Principled, bent
+from .principled import Chances, Principled, bent
 from .rough import Tangent
-from .sheen import sheen_albedo
 
 F82 = f4(1 / 7)  # cosine of the angle where `specular_color` tints a metal, about 82°
 MICROMETERS = f4(1000)  # in nanometers
@@ -104,7 +104,7 @@ class OpenPBRBsdf(JointBsdf):
         self.transmissive = "transmission_weight" in used
         layers = Layers(multiscatter=self.multiscatter, thin=self.thin)
         layers.transmissive, layers._coated = self.transmissive, "coat_weight" in used
-        layers._cloth, layers.rough_base = "fuzz_weight" in used, "base_diffuse_roughness" in used
+        layers._fuzzy, layers.rough_base = "fuzz_weight" in used, "base_diffuse_roughness" in used
         layers.has_film = {"thin_film_weight", "thin_film_thickness"} <= used
         stretched = "specular_roughness_anisotropy" in used
         layers.tangent = Tangent(np.zeros(1, f4)) if stretched else None
@@ -176,9 +176,9 @@ class OpenPBRBsdf(JointBsdf):
             coat_ior=np.maximum(self.coat_ior, f4(1) / self.coat_ior),
             coat_color=self.coat_color,
             darkening=self.coat_darkening * self.coat_weight,
-            sheen=self.fuzz_weight,
-            sheen_color=self.fuzz_color,
-            sheen_roughness=self.fuzz_roughness,
+            fuzz_weight=self.fuzz_weight,
+            fuzz_color=self.fuzz_color,
+            fuzz_roughness=self.fuzz_roughness,
         )
         return layers
 
@@ -189,6 +189,7 @@ class Layers(Principled):
     indices = ()  # they are relative already
 
     rough_base: bool
+    _fuzzy: bool
     index_below: Floats  # (n,) of the base relative to the coat, at least 1
     metal_color: Floats  # (3, n) reflectance of the metal along the normal
     edge: Floats  # (3, n) what a metal absorbs at `F82` beyond Schlick's approximation
@@ -200,6 +201,9 @@ class Layers(Principled):
     coat_ior: Floats  # (n,)
     coat_color: Floats  # (3, n)
     darkening: Floats  # (n,)
+    fuzz_weight: Floats  # (n,)
+    fuzz_color: Floats  # (3, n)
+    fuzz_roughness: Floats  # (n,)
 
     def evaluate(self, wo: Floats, wi: Floats) -> tuple[Floats, Floats]:
         """Return `f` and `pdf` of all lobes: the base, then coat and fuzz layered over it."""
@@ -214,10 +218,25 @@ class Layers(Principled):
             f = f * (f4(1) - self.clearcoat * lost) * self._absorbed(zo, zi, wi[2] < 0) * self._darkened()
             f = f + value * self.clearcoat * fresnel_dielectric(cos, self.coat_ior)[0]
             pdf = pdf + chances.coat * density
-        if self._cloth:
-            lost = np.maximum(*(sheen_albedo(z, self.sheen_roughness) for z in (zo, zi)))
-            f = f * (f4(1) - self.sheen * lost) + self._sheen(wo, wi)
+        if self._fuzzy:
+            value, density, albedo = fuzz_lobe(wo, wi, self.fuzz_roughness)
+            f = f * (f4(1) - self.fuzz_weight * albedo) + self.fuzz_color * (self.fuzz_weight * value)
+            pdf = pdf + chances.fuzz * density
         return f, pdf
+
+    def _directions(self, wo: Floats, u: Floats) -> tuple[Floats, Bools, Floats | None]:
+        wi, crosses, eta = super()._directions(wo, u)
+        if self._fuzzy:
+            fibers = u[2] >= f4(1) - self._chances(wo).fuzz
+            wi = np.where(fibers, fuzz_directions(wo, u, self.fuzz_roughness), wi)
+        return wi, crosses, eta
+
+    def _weights(self, wo: Floats) -> Chances:
+        weights = super()._weights(wo)
+        if not self._fuzzy:
+            return weights
+        seen = self.fuzz_weight * fuzz_albedo(wo[2], self.fuzz_roughness)
+        return weights._replace(fuzz=self.fuzz_color.max(0) * seen / (f4(1) - seen))
 
     @property
     def _tint(self) -> Floats:

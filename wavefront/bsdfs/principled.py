@@ -35,6 +35,7 @@ class Chances(NamedTuple):
     coat: Floats  # reflection in the clear coat
     again: Floats  # what the microfacets of clear parts scatter more than once, on both sides
     diffuse: Floats  # cosine-weighted
+    fuzz: Floats = np.zeros(1, f4)  # fibers, of OpenPBR
 
 
 @parametrized
@@ -185,7 +186,14 @@ class Principled(Microfacets):
 
     def sample_f(self, wo: Floats, u: Floats) -> BsdfSample:
         """Select a lobe by u[2], sample it, and weight by the density of all lobes."""
-        gloss, glass, coat, again, _ = self._chances(wo)
+        wi, crosses, eta = self._directions(wo, u)
+        f, pdf = self.evaluate(wo, wi)
+        pdf = np.where((wi[2] < 0) == crosses, pdf, f4(0))
+        return BsdfSample(wi, weigh(f, wi, pdf), pdf, broadcast(np.False_, len(pdf)), eta)
+
+    def _directions(self, wo: Floats, u: Floats) -> tuple[Floats, Bools, Floats | None]:
+        """Return samples of lobes (3, n), whether they are to cross the surface, and the index they meet."""
+        gloss, glass, coat, again, *_ = self._chances(wo)
         facet = gloss + glass
         coated = (u[2] >= facet) & (u[2] < facet + coat)
         facets = self.facets()
@@ -210,9 +218,7 @@ class Principled(Microfacets):
                 wi[:, lanes] = self._loss().directions(self, numbers, self._inside, lanes)
                 crosses[lanes] = wi[2, lanes] < 0
             eta = np.where(crosses, index, f4(1))
-        f, pdf = self.evaluate(wo, wi)
-        pdf = np.where((wi[2] < 0) == crosses, pdf, f4(0))
-        return BsdfSample(wi, weigh(f, wi, pdf), pdf, broadcast(np.False_, len(pdf)), eta)
+        return wi, crosses, eta
 
     def _base(self, wo: Floats, wi: Floats, chances: Chances) -> tuple[Floats, Floats]:
         """Metal, diffuse base, gloss and glass: value (3, n) and their part of the density (n,)."""
@@ -365,6 +371,13 @@ class Principled(Microfacets):
 
     def _chances(self, wo: Floats) -> Chances:
         """Share the samples out by about what each lobe reflects; none that has any value gets 0."""
+        weights = self._weights(wo)
+        total = sum(weights[1:], weights[0])
+        share = f4(1) / np.where(total > 0, total, f4(1))
+        return Chances(*(np.broadcast_to(part * share, wo[2].shape) for part in weights))
+
+    def _weights(self, wo: Floats) -> Chances:
+        """Return about what each lobe reflects."""
         weight = _fifth(wo[2])
         opaque = (f4(1) - self.metallic) * (f4(1) - self.transmission)
         seen = luminance(self._dielectric(weight))
@@ -375,16 +388,13 @@ class Principled(Microfacets):
         glass = (f4(1) - self.metallic) * self.transmission
         if self._cloth:
             diffuse = diffuse + self.sheen * self.sheen_color.max(0) * (f4(0.2) + weight)
-        again = f4(0)
+        again = coat = np.zeros(1, f4)
         if self._clear_again:
             again = glass * self._loss().at(self, wo, self._inside)
             glass = glass - again
-        coat = self.clearcoat * (floor + _schlick(COAT_F0, wo[2])) if self._coated else f4(0)
-        total = gloss + glass + coat + again + diffuse
-        share = f4(1) / np.where(total > 0, total, f4(1))
-        full = np.broadcast_to
-        shape = wo[2].shape
-        return Chances(*(full(part * share, shape) for part in (gloss, glass, coat, again, diffuse)))
+        if self._coated:
+            coat = self.clearcoat * (floor + _schlick(COAT_F0, wo[2]))
+        return Chances(gloss, glass, coat, again, diffuse)
 
 
 def _chance(reflected: Floats) -> Floats:
