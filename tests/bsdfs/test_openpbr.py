@@ -5,7 +5,7 @@ import pytest
 
 from wavefront.bsdfs import OpenPBRBsdf, OrenNayar
 from wavefront.bsdfs.albedo import dielectric_albedo
-from wavefront.bsdfs.fresnel import fresnel_dielectric
+from wavefront.bsdfs.fresnel import fresnel_conductor, fresnel_dielectric
 from wavefront.bsdfs.fuzz import fuzz_albedo, fuzz_lobe
 from wavefront.bsdfs.openpbr import weighted_index
 from wavefront.bsdfs.thin_film import film_reflectance
@@ -128,6 +128,21 @@ def test_the_thickness_of_a_film_is_in_micrometers():
     layers = OpenPBRBsdf(thin_film_weight=1.0, thin_film_thickness=0.4, base_color=0.5)._layers
     film = film_reflectance(F4([0.7]), F4([400]), F4([1.4]), F4(1), F4([1.5]))
     assert layers._gloss(F4([0.7])) == pytest.approx(film, rel=1e-3)
+
+
+@pytest.mark.parametrize("edge", [0.0, 0.4, 1.0])
+def test_a_metal_below_a_film_has_an_index(edge):
+    """With F0 along the normal, and from the index with no extinction to the least one by its tint."""
+    f0 = np.array([[0.9], [0.5], [0.2]])
+    metal = {"base_metalness": 1.0, "base_color": f0, "specular_color": edge, "thin_film_weight": 1.0}
+    root = np.sqrt(f0)
+    eta = (1 - edge) * (1 + root) / (1 - root) + edge * (1 - f0) / (1 + f0)
+    k = np.sqrt((f0 * (eta + 1) ** 2 - (eta - 1) ** 2) / (1 - f0))
+    cos = F4([0.2, 0.7, 1])
+    assert fresnel_conductor(F4([1]), eta, k) == pytest.approx(f0, rel=1e-5)
+    film = film_reflectance(cos, F4([350]), F4([1.4]), F4(1), eta.astype(F4), k.astype(F4))
+    layers = OpenPBRBsdf(**metal, thin_film_thickness=0.35)._layers
+    assert layers._metal(cos) == pytest.approx(film, rel=1e-3)
 
 
 def test_a_coat_reflects_by_its_index():

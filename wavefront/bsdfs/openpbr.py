@@ -27,10 +27,12 @@ from .microfacet import Facets, alpha_of
 from .oren_nayar import OrenNayar
 from .principled import Chances, Principled, bent
 from .rough import Tangent
+from .thin_film import film_reflectance
 
 F82 = f4(1 / 7)  # cosine of the angle where `specular_color` tints a metal, about 82°
 MICROMETERS = f4(1000)  # in nanometers
 LEAST_TINT = f4(1e-6)
+HIGHEST_F0 = f4(0.99)  # of a metal that has an index of refraction
 
 
 @parametrized
@@ -283,8 +285,22 @@ class Layers(Principled):
         dip = (f0 + (f4(1) - f0) * steep) * self.edge / (F82 * steep * (f4(1) - F82))
         plain = f0 + (f4(1) - f0) * fifth - dip * (cos * fifth * away)
         if self.has_film:
-            plain = plain + (self._film(cos, f0) - plain) * self.film_weight
+            plain = plain + (self._metal_below_film(cos) - plain) * self.film_weight
         return np.maximum(plain, f4(0)) * self.specular_weight
+
+    def _metal_below_film(self, cos: Floats) -> Floats:
+        """Reflectance of the metal below the film, (3, n).
+
+        Its index η + ik is that of O. Gulbrandsen 2014, "Artist Friendly Metallic Fresnel" (JCGT 3(4)), for
+        its color along the normal and the tint at the edge.
+        """
+        f0 = np.minimum(self.metal_color, HIGHEST_F0)
+        root = np.sqrt(f0)
+        most, least = (f4(1) + root) / (f4(1) - root), (f4(1) - f0) / (f4(1) + f0)
+        eta = least + (most - least) * self.edge
+        k2 = (f0 * (eta + f4(1)) ** 2 - (eta - f4(1)) ** 2) / (f4(1) - f0)
+        k = np.sqrt(np.maximum(k2, f4(0)))
+        return film_reflectance(cos, self.film_thickness, self.film_ior, f4(1), eta, k)
 
     def _mean_metal(self) -> Floats:
         return mean_over_cosines(self._metal)
