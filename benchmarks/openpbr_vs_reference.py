@@ -47,7 +47,7 @@ int main(int, char** argv) {
 }
 """
 RED = (0.8, 0.3, 0.1)
-SPREAD = 1.1673039782614187  # x⁵ = x + 1: powers of 1/x spread evenly in four dimensions (M. Roberts)
+SPREAD = 1.0969815577985598  # x⁸ = x + 1: multiples of powers of 1/x are spread evenly (M. Roberts)
 NO_GLOSS = {"specular_weight": 0.0}
 LOBES = {
     "diffuse": {"base_color": RED, **NO_GLOSS},
@@ -59,7 +59,20 @@ LOBES = {
     "metal, rough 0.8": {"base_color": RED, "base_metalness": 1.0, "specular_roughness": 0.8},
     "metal, anisotropic": {"base_color": RED, "base_metalness": 1.0, "specular_roughness_anisotropy": 0.7},
     "clear": {"transmission_weight": 1.0, "specular_roughness": 0.4},
+    "clear, tinted": {
+        "transmission_weight": 1.0,
+        "transmission_color": (0.9, 0.7, 0.5),
+        "specular_color": RED,
+        "specular_roughness": 0.4,
+    },
     "sheet": {"transmission_weight": 1.0, "specular_roughness": 0.4, "geometry_thin_walled": True},
+    "sheet, tinted": {
+        "transmission_weight": 1.0,
+        "transmission_color": (0.9, 0.7, 0.5),
+        "specular_color": RED,
+        "specular_roughness": 0.4,
+        "geometry_thin_walled": True,
+    },
     "film on metal": {"base_color": RED, "base_metalness": 1.0, "thin_film_weight": 1.0},
     "film on tinted metal": {
         "base_color": RED,
@@ -149,23 +162,31 @@ def wavelengths(parameters: dict) -> np.ndarray:
     return np.concatenate([np.repeat(1e9 / wave[None], 3, 0), weight]).T.astype(np.float32)
 
 
-def pairs(n: int, below: bool) -> tuple[np.ndarray, np.ndarray]:
-    """Return two sets of directions (3, n), uniform in solid angle; wi also below the surface."""
+def pairs(bsdf: OpenPBRBsdf, n: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Return two sets of directions (3, n), and the weights of an integral over them, (n,).
+
+    They are uniform, but half of wi are samples of the BSDF, so that narrow lobes have their part.
+    """
 
     def direction(z: np.ndarray, turn: np.ndarray) -> np.ndarray:
         r, angle = np.sqrt(1 - z * z), 2 * np.pi * turn
         return np.stack([r * np.cos(angle), r * np.sin(angle), z]).astype(np.float32)
 
-    x, y, z, w = np.arange(n) * SPREAD ** -np.arange(1.0, 5.0)[:, None] % 1
-    least = -1 if below else 0.02
-    return direction(0.02 + 0.98 * x, y), direction(least + (1 - least) * z, w)
+    x, y, z, w, *u = np.arange(n) * SPREAD ** -np.arange(1.0, 8.0)[:, None] % 1
+    wo, wi = direction(0.02 + 0.98 * x, y), direction(2 * z - 1 if bsdf.transmissive else z, w)
+    drawn = bsdf.sample_f(wo[:, ::2], np.array(u, np.float32)[:, ::2])
+    wi[:, ::2] = np.where(drawn.pdf > 0, drawn.wi, wi[:, ::2])
+    area = 4 * np.pi if bsdf.transmissive else 2 * np.pi
+    weight = 2 / (1 / area + bsdf.pdf(wo, wi).astype(float)) / n
+    weight[::2] *= drawn.pdf > 0
+    return wo, wi, weight
 
 
-def compared(name: str, programs: list[Path], n: int = 60_000) -> Row:
+def compared(name: str, programs: list[Path], n: int = 40_000) -> Row:
     """Compare a lobe at n pairs of directions."""
     parameters = LOBES[name]
     bsdf, waves = OpenPBRBsdf(**parameters), wavelengths(parameters)
-    wo, wi = pairs(n, bsdf.transmissive)
+    wo, wi, weight = pairs(bsdf, n)
     command = [programs["fuzz_weight" not in parameters], str(list(LOBES).index(name)), str(len(waves))]
     data = waves.tobytes() + np.ascontiguousarray(np.concatenate([wo, wi]).T).tobytes()
     out = subprocess.run(command, input=data, check=True, capture_output=True).stdout
@@ -174,14 +195,14 @@ def compared(name: str, programs: list[Path], n: int = 60_000) -> Row:
     if bsdf.transmissive and not bsdf.thin:
         f = np.where(wi[2] < 0, f * np.float32(1.5**2), f)  # theirs does not scale radiance
     f = f * np.abs(wi[2])
-    area = 4 * np.pi if bsdf.transmissive else 2 * np.pi
     gap, seen = np.abs(f - theirs).mean(0), np.mean(theirs, 0)
     lit = seen > 1e-4
+    reference, albedo, difference = (float((weight * each).sum()) for each in (seen, f.mean(0), gap))
     return Row(
         name,
-        float(seen.mean() * area),
-        float(f.mean() * area),
-        float(gap.mean() / seen.mean()),
+        reference,
+        albedo,
+        difference / reference,
         float(np.median(gap[lit] / seen[lit])),
         float(np.median(pdf[lit] / density[lit])),
     )

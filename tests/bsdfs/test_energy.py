@@ -10,7 +10,7 @@ from scipy import stats
 from test_bsdfs import Constant, surface
 
 import wavefront as wf
-from wavefront.bsdfs import Bsdf, Conductor, Dielectric, Plastic, Principled, ThinDielectric
+from wavefront.bsdfs import Bsdf, Conductor, Dielectric, OpenPBRBsdf, Plastic, Principled, ThinDielectric
 from wavefront.bsdfs.energy import Shape, loss, mean_over_cosines, part_kept, scaling
 from wavefront.bsdfs.rough import RoughBsdf
 from wavefront.textures.parameter import scalar
@@ -67,6 +67,10 @@ WHITE = {
     "principled gloss": lambda rng, r: Principled(1.0, 0.0, r),
     "principled glass": lambda rng, r: Principled(1.0, 0.0, r, rng.uniform(1.1, 2.4), 1.0),
     "principled sheet": lambda rng, r: Principled(1.0, 0.0, r, 1.5, 1.0, thin=True),
+    "sheet of OpenPBR": lambda rng, r: OpenPBRBsdf(
+        transmission_weight=1.0, specular_roughness=r, geometry_thin_walled=True
+    ),
+    "clear part of OpenPBR": lambda rng, r: OpenPBRBsdf(transmission_weight=1.0, specular_roughness=r),
     "all of principled": lambda rng, r: Principled(1.0, 0.3, r, 1.5, 0.5),
 }
 

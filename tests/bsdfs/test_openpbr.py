@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from test_bsdfs import surface
 
 from wavefront.bsdfs import OpenPBRBsdf, OrenNayar
 from wavefront.bsdfs.albedo import dielectric_albedo
@@ -22,6 +23,12 @@ def pair(wo_z: float, wi_z: float, turn: float = np.pi) -> tuple[np.ndarray, np.
         return np.array([[r * np.cos(turn)], [r * np.sin(turn)], [z]], F4)
 
     return at(wo_z, 0), at(wi_z, turn)
+
+
+def facet_cosine(wo: np.ndarray, wi: np.ndarray) -> np.ndarray:
+    """Of wo and the facet that mirrors it to wi, which is turned to the upper side."""
+    half = wo + wi * np.array([[1], [1], [-1]]) * np.sign(-wi[2])
+    return np.linalg.norm(half, axis=0) / 2
 
 
 def mean_fresnel(ior: float) -> float:
@@ -191,7 +198,25 @@ def test_light_that_crosses_is_tinted():
         wo, wi = pair(0.8, -0.8, 3)
         plain, tinted = (OpenPBRBsdf(**given, transmission_color=c).f(wo, wi) for c in (1.0, tint))
         assert (plain > 0).all()
-        assert tinted == pytest.approx(tint * plain, rel=1e-4)
+        length = 1 / np.sqrt(1 - (1 - facet_cosine(wo, wi) ** 2) / 1.5**2) if thin else 1.0
+        assert tinted == pytest.approx(tint**length * plain, rel=1e-4)
+
+
+@pytest.mark.parametrize("thin", [False, True])
+def test_a_clear_part_reflects_its_color_outside_alone(thin):
+    tint = np.array([[0.9], [0.5], [0.2]])
+    given = {"transmission_weight": 1.0, "specular_roughness": 0.6, "geometry_thin_walled": thin}
+    for inside in (False, True):
+        wo, wi = pair(0.6, 0.4, 0.3)
+        plain, tinted = (
+            OpenPBRBsdf(**given, specular_color=c).bind(surface(wo, inside)).f(wo, wi) for c in (1.0, tint)
+        )
+        assert tinted == pytest.approx(plain * (1.0 if inside and not thin else tint), rel=1e-4)
+        down = wi * F4([[1], [1], [-1]])
+        plain, tinted = (
+            OpenPBRBsdf(**given, specular_color=c).bind(surface(wo, inside)).f(wo, down) for c in (1.0, tint)
+        )
+        assert tinted == pytest.approx(plain, rel=1e-5)
 
 
 def test_unknown_parameters_are_refused():

@@ -14,7 +14,7 @@ import numpy as np
 
 from ..arrays.elementary import exp, log
 from ..arrays.state import SurfaceInteraction
-from ..arrays.vec import INV_PI, TINY, Bools, Floats, f4
+from ..arrays.vec import INV_PI, TINY, Bools, Floats, dot, f4
 from ..core.parameter import Parameter, flag, parametrized
 from ..textures.base import BaseTexture
 from ..textures.parameter import Color, Scalar, color, refractive_index, scalar
@@ -108,6 +108,8 @@ class OpenPBRBsdf(JointBsdf):
         layers.transmissive, layers._coated = self.transmissive, "coat_weight" in used
         layers._fuzzy, layers.rough_base = "fuzz_weight" in used, "base_diffuse_roughness" in used
         layers.has_film = {"thin_film_weight", "thin_film_thickness"} <= used
+        layers._tinted = not is_white(self.specular_color)
+        layers._stained = self.thin and not is_white(self.transmission_color)
         stretched = "specular_roughness_anisotropy" in used
         layers.tangent = Tangent(np.zeros(1, f4)) if stretched else None
         across = {"specular_roughness", "specular_roughness_anisotropy", "coat_roughness", "coat_weight"}
@@ -192,6 +194,8 @@ class Layers(Principled):
 
     rough_base: bool
     _fuzzy: bool
+    _tinted: bool
+    _stained: bool
     index_below: Floats  # (n,) of the base relative to the coat, at least 1
     metal_color: Floats  # (3, n) reflectance of the metal along the normal
     edge: Floats  # (3, n) what a metal absorbs at `F82` beyond Schlick's approximation
@@ -242,7 +246,22 @@ class Layers(Principled):
 
     @property
     def _tint(self) -> Floats:
-        return self.passed
+        return np.ones(1, f4) if self.thin else self.passed
+
+    @property
+    def _shine(self) -> Floats:
+        """Tint of what the clear part reflects outside; total reflection inside has none."""
+        if not self._tinted:
+            return super()._shine
+        return np.where(self._inside, f4(1), self.specular_color)
+
+    def _through(self, wo: Floats, wi: Floats, facets: Facets) -> tuple[Floats, Floats]:
+        """Return what crosses; a sheet absorbs along the refracted ray."""
+        value, density = super()._through(wo, wi, facets)
+        if self._stained:
+            half = wo + wi * np.array([[1], [1], [-1]], f4)
+            value = value * _power(self.passed, self._length(f4(0.5) * np.sqrt(dot(half, half)), self.ior))
+        return value, density
 
     def _dielectric(self, weight: Floats) -> Floats:
         """About the reflectance of the opaque dielectric, (3, n), for the choice of lobes."""
@@ -316,11 +335,15 @@ class Layers(Principled):
 
     def _absorbed(self, zo: Floats, zi: Floats, crosses: Any) -> Floats:
         """Light that the coat lets pass, (3, n): `coat_color` where it is passed twice along the normal."""
-        sin2 = f4(1) / (self.coat_ior * self.coat_ior)
-        lengths = (f4(1) / np.sqrt(np.maximum(f4(1) - (f4(1) - z * z) * sin2, TINY)) for z in (zo, zi))
-        part = sum(lengths, f4(0)) * np.where(crosses, f4(0.25), f4(0.5))
-        color = exp(log(np.maximum(self.coat_color, LEAST_TINT)) * part)
+        lengths = self._length(zo, self.coat_ior) + self._length(zi, self.coat_ior)
+        color = _power(self.coat_color, lengths * np.where(crosses, f4(0.25), f4(0.5)))
         return f4(1) + (color - f4(1)) * self.clearcoat
+
+    @staticmethod
+    def _length(cos: Floats, ior: Floats) -> Floats:
+        """Length of a refracted ray through a layer, relative to that along the normal, (n,)."""
+        sin2 = (f4(1) - cos * cos) * (f4(1) / (ior * ior))
+        return f4(1) / np.sqrt(np.maximum(f4(1) - sin2, TINY))
 
     def _darkened(self) -> Floats:
         """Part that is left of light that the coat threw back to the base, (3, n) (specification, Δ)."""
@@ -335,6 +358,16 @@ class Layers(Principled):
         base = opaque * (self.base_color + (f4(1) - self.base_color) * below) + self.transmission
         albedo = base + (self._mean_metal() - base) * m
         return f4(1) + ((f4(1) - back) / (f4(1) - albedo * back) - f4(1)) * self.darkening
+
+
+def is_white(colors: Any) -> bool:
+    """Return whether colors are constant and 1."""
+    return not isinstance(colors, BaseTexture) and bool(np.all(colors == 1))
+
+
+def _power(colors: Floats, exponent: Floats) -> Floats:
+    """Return powers of colors, (3, n)."""
+    return exp(log(np.maximum(colors, LEAST_TINT)) * exponent)
 
 
 def weighted_index(ior: Floats, weight: Floats) -> Floats:

@@ -242,17 +242,22 @@ class Principled(Microfacets):
         if self._sheet_again or self._clear_again:
             grown = gain(self, wo, wi, None, both)
             value, through = value * grown, through * grown if self.thin else through
-        once = value * reflected * clear + self._tint * (through * clear)
+        once = value * reflected * (self._shine * clear) + self._tint * (through * clear)
         if not self._clear_again:
             return f + once, pdf
         added, spread, _ = self._loss().lobe(self, wo, wi, self._inside, both)
-        tint = np.where(wi[2] < 0, self._tint, f4(1))
+        tint = np.where(wi[2] < 0, self._tint, self._shine)
         return f + once + tint * (added * clear), pdf + chances.again * spread
 
     @property
     def _tint(self) -> Floats:
         """Tint of the light that crosses the surface, (3, n)."""
         return self.base_color
+
+    @property
+    def _shine(self) -> Floats:
+        """Tint of what the clear part reflects, (1,) or (3, n)."""
+        return np.ones(1, f4)
 
     def _gloss(self, cos: Floats) -> Floats:
         """Reflectance of the opaque dielectric, (3, n)."""
