@@ -66,11 +66,34 @@ TESTS: dict[str, tuple[str, ...]] = {
         "tests/aovs/test_sampled_layers.py",
         "tests/denoising/test_denoising.py",
     ),
-    "wavefront/bsdfs/plastic.py": (
-        "tests/bsdfs/test_bsdf_formulas.py",
-        "tests/bsdfs/test_energy.py",
+    **dict.fromkeys(
+        (
+            "wavefront/bsdfs/plastic.py",
+            "wavefront/bsdfs/microfacet.py",
+            "wavefront/bsdfs/rough.py",
+            "wavefront/bsdfs/energy.py",
+        ),
+        (
+            "tests/bsdfs/test_bsdf_formulas.py",
+            "tests/bsdfs/test_energy.py",
+            "tests/bsdfs/test_bsdfs.py",
+            "tests/bsdfs/test_bsdf_models.py",
+            "tests/properties/test_density_of_bsdfs.py",
+        ),
+    ),
+    "wavefront/bsdfs/diffuse_transmission.py": (
         "tests/bsdfs/test_bsdfs.py",
         "tests/bsdfs/test_bsdf_models.py",
+        "tests/properties/test_density_of_bsdfs.py",
+    ),
+    "wavefront/bsdfs/openpbr.py": (
+        "tests/bsdfs/test_openpbr.py",
+        "tests/bsdfs/test_bsdfs.py",
+        "tests/bsdfs/test_bsdf_models.py",
+        "tests/properties/test_density_of_bsdfs.py",
+    ),
+    "wavefront/bsdfs/measured.py": (
+        "tests/bsdfs/test_measured.py",
         "tests/properties/test_density_of_bsdfs.py",
     ),
     **dict.fromkeys(
@@ -85,6 +108,23 @@ TESTS: dict[str, tuple[str, ...]] = {
     "wavefront/bsdfs/channels.py": ("tests/bsdfs/test_channels.py",),
     "wavefront/bsdfs/thin_film.py": ("tests/bsdfs/test_thin_film.py",),
     "wavefront/film/light_sums.py": ("tests/integrators/test_caustics.py",),
+    "wavefront/lights/spot.py": (
+        "tests/lights/test_spot.py",
+        "tests/lights/test_projector.py",
+        "tests/properties/test_density_of_lights.py",
+    ),
+    "wavefront/lights/projector.py": ("tests/lights/test_projector.py", "tests/lights/test_spot.py"),
+    "wavefront/stages/normal_mapping.py": (
+        "tests/textures/test_folded_scattering.py",
+        "tests/textures/test_normal_maps.py",
+    ),
+    **dict.fromkeys(
+        ("wavefront/accel/distance_grid.py", "wavefront/shapes/distance_grid.py"),
+        ("tests/accel/test_distance_grid.py",),
+    ),
+    "wavefront/lights/glow.py": ("tests/lights/test_glow.py",),
+    "wavefront/lights/ies.py": ("tests/properties/test_density_of_lights.py", "tests/lights/test_ies.py"),
+    "wavefront/lights/table.py": ("tests/properties/test_density_of_lights.py", "tests/lights/test_glow.py"),
 }
 FORMULAS = tuple(TESTS)
 # files with densities
@@ -93,43 +133,56 @@ DENSITIES = (
     "wavefront/sampling/spherical.py",
     "wavefront/sampling/discrete.py",
     "wavefront/bsdfs/base.py",
+    "wavefront/bsdfs/channels.py",
     "wavefront/bsdfs/conductor.py",
     "wavefront/bsdfs/dielectric.py",
     "wavefront/bsdfs/diffuse.py",
+    "wavefront/bsdfs/diffuse_transmission.py",
     "wavefront/bsdfs/disney.py",
     "wavefront/bsdfs/disney_thin.py",
+    "wavefront/bsdfs/energy.py",
+    "wavefront/bsdfs/measured.py",
     "wavefront/bsdfs/microfacet.py",
     "wavefront/bsdfs/mirror.py",
     "wavefront/bsdfs/mix.py",
+    "wavefront/bsdfs/openpbr.py",
     "wavefront/bsdfs/oren_nayar.py",
     "wavefront/bsdfs/plastic.py",
     "wavefront/bsdfs/principled.py",
+    "wavefront/bsdfs/sheen.py",
     "wavefront/bsdfs/sides.py",
     "wavefront/bsdfs/thin.py",
     "wavefront/guiding/guide_table.py",
+    "wavefront/lights/base.py",
     "wavefront/lights/directional.py",
     "wavefront/lights/environment.py",
+    "wavefront/lights/glow.py",
+    "wavefront/lights/grid.py",
+    "wavefront/lights/ies.py",
     "wavefront/lights/image.py",
     "wavefront/lights/infinite.py",
     "wavefront/lights/planar.py",
     "wavefront/lights/point.py",
+    "wavefront/lights/product.py",
     "wavefront/lights/rectangle.py",
     "wavefront/lights/samplers.py",
+    "wavefront/lights/sky.py",
     "wavefront/lights/sphere.py",
     "wavefront/lights/spot.py",
     "wavefront/lights/table.py",
     "wavefront/lights/tree.py",
     "wavefront/lights/triangle.py",
 )
+CHOICES = ("grid.py", "samplers.py", "tree.py")  # of one light among many
 TESTS |= {
     file: (f"tests/properties/test_density_of_{of}.py",)
     for file in DENSITIES
     if file not in TESTS
     for of in (
         *["bsdfs"] * ("/bsdfs/" in file),
-        *["tables"] * file.endswith(("discrete.py", "samplers.py", "tree.py")),
+        *["tables"] * file.endswith(("discrete.py", *CHOICES)),
         *["warps"] * file.endswith(("warp.py", "spherical.py")),
-        *["lights"] * ("/lights/" in file and not file.endswith(("samplers.py", "tree.py"))),
+        *["lights"] * ("/lights/" in file and not file.endswith(CHOICES)),
     )
 }
 UNUSABLE = 6  # status of a mutant that cannot be imported, beside those of pytest

@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from significance import assert_same_images, repeat
 
 import wavefront as wf
 from wavefront.lights import LightTable
@@ -337,6 +338,22 @@ def test_a_dome_lights_a_floor(integrator):
     for lights, irradiance in (([Dome()], 2 * np.pi / 3), ([Dome(), wf.Environment(2 / 3)], 4 * np.pi / 3)):
         found = measure([floor()], lights, 512, integrator=integrator)
         assert_close(found, (np.full(3, 0.5 / np.pi * irradiance), np.zeros(3)))
+
+
+@pytest.mark.parametrize("integrator", ["direct_simple", "full"])
+def test_a_sky_that_is_sampled_for_its_receivers_is_even(integrator):
+    """As an environment of the same radiance is, on slopes of all kinds, by means of many pictures."""
+    materials = wf.Diffuse(0.6), wf.Conductor.named("gold", 0.5)
+    balls = [wf.Sphere((1.2 * k - 0.6, 0.5, 0), 0.5, material=each) for k, each in enumerate(materials)]
+    camera = wf.Camera.look_at((0, 1.5, 4), (0, 0.4, 0), fov=30, size=(32, 16))
+    skies = example("EvenSky")(column((0, 1, 0))), wf.Environment(1)
+    own, even = (
+        repeat(
+            wf.Scene([floor(), *balls], [sky], camera), 32, 12, 100 * k, max_bounces=2, integrator=integrator
+        )
+        for k, sky in enumerate(skies)
+    )
+    assert_same_images(own, even, max_error=0.002)
 
 
 # --- Mistakes --------------------------------------------------------------------------------------

@@ -8,7 +8,6 @@ import scenes
 from significance import assert_same_images, repeat
 
 import wavefront as wf
-from wavefront import testing
 from wavefront.arrays.vec import f4
 from wavefront.lights import (
     LightRecord,
@@ -50,21 +49,6 @@ LIGHTS = {
 def receiver(normal: tuple[float, ...], n: int = 1, opaque: bool = True) -> Receiver:
     unit = f4(normal).reshape(3, 1) / f4(np.sqrt(np.square(normal).sum()))
     return Receiver(np.repeat(unit, n, 1), np.full(n, opaque))
-
-
-@pytest.mark.parametrize("normal", NORMALS)
-@pytest.mark.parametrize(
-    "point",
-    [(0.2, 0, 0.1), (0.9, 0.97, -0.3), (3, -2, 1), (0.4, 0.5, 5)],
-    ids=["below", "close", "far", "beside"],
-)
-@pytest.mark.parametrize("name", LIGHTS)
-@pytest.mark.first(3)
-def test_the_contract_holds_for_each_normal(
-    name: str, point: tuple[float, ...], normal: tuple[float, ...]
-) -> None:
-    light: LightRecord = LIGHTS[name]().lighting(receiver(normal))
-    testing.check_light(light, points=[point], samples=40_000)
 
 
 def samples(

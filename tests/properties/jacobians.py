@@ -18,6 +18,7 @@ from hypothesis import strategies as st
 from wavefront.bsdfs.albedo import _dielectric_tables as dielectric_tables
 from wavefront.bsdfs.albedo import gloss_tables
 from wavefront.bsdfs.sheen import _albedo_table as sheen_table
+from wavefront.lights import Receiver
 
 Doubles = np.ndarray
 ROOMS = (
@@ -42,6 +43,20 @@ fewest = settings(max_examples=settings.default.max_examples // 20)
 # float32 numbers, away from 0 and 1, so that differences have room on both sides
 inner = st.floats(2.0**-13, 1 - 2.0**-13, width=32)
 points_of_the_square = st.tuples(inner, inner)
+numbers = st.floats(-2, 2, width=32)
+places = st.tuples(numbers, numbers, numbers)
+
+
+@st.composite
+def receivers(draw: st.DrawFn) -> Receiver:
+    """One surface that is lit, of any normal; light may cross it."""
+    normal = np.array(draw(places), np.float32)
+    size = np.sqrt(normal @ normal)
+    assume(size > 0.1)
+    return Receiver((normal / size).reshape(3, 1), np.array([draw(st.booleans())]))
+
+
+surfaces = st.none() | receivers()  # None: not known
 
 
 @contextmanager

@@ -6,7 +6,16 @@ import pytest
 from hypothesis import assume, given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
-from jacobians import assert_density, columns, doubles, few, points_of_the_square, some
+from jacobians import (
+    assert_density,
+    columns,
+    doubles,
+    few,
+    places,
+    points_of_the_square,
+    some,
+    surfaces,
+)
 
 import wavefront as wf
 from wavefront.lights import (
@@ -15,6 +24,7 @@ from wavefront.lights import (
     LightRecord,
     LightTable,
     PointLightRecord,
+    Receiver,
     SphereLights,
     TriangleLights,
 )
@@ -24,8 +34,6 @@ from wavefront.lights.textured_sphere import TexturedSphereLights
 from wavefront.lights.triangle import TwoSidedTriangleLights
 
 f4 = np.float32
-numbers = st.floats(-2, 2, width=32)
-places = st.tuples(numbers, numbers, numbers)
 sizes = st.floats(0.125, 2, width=32)
 RADIANCE = f4([[1], [2], [3]])
 TURNED, _ = np.linalg.qr([[3.0, 1, 2], [-1, 4, 1], [1, -2, 5]])  # an orthogonal matrix of no symmetry
@@ -103,6 +111,10 @@ def skies(draw):
     return left if left.table.share and draw(st.booleans()) else record
 
 
+def lit(light: LightRecord, receiver: Receiver | None) -> LightRecord:
+    return light if receiver is None else light.lighting(receiver)
+
+
 # Whether the direction of a sample is all that its density depends on, and with what tolerance
 KINDS = {
     "triangle": (triangles(), 1e-4),
@@ -141,10 +153,12 @@ def _subclasses(kind: type) -> set[type]:
 
 @kinds
 @some
-@given(data=st.data(), place=places, u=points_of_the_square)
-def test_density_of_directions(kind: str, data: st.DataObject, place, u: tuple[float, float]) -> None:
+@given(data=st.data(), surface=surfaces, place=places, u=points_of_the_square)
+def test_density_of_directions(
+    kind: str, data: st.DataObject, surface: Receiver | None, place, u: tuple[float, float]
+) -> None:
     strategy, rounding = KINDS[kind]
-    light = data.draw(strategy)
+    light = lit(data.draw(strategy), surface)
     point = columns(*place)
 
     def direction(v):
@@ -167,10 +181,12 @@ def test_density_of_directions(kind: str, data: st.DataObject, place, u: tuple[f
 
 @kinds
 @some
-@given(data=st.data(), place=places, u=points_of_the_square)
-def test_samples_have_their_density(kind: str, data: st.DataObject, place, u: tuple[float, float]) -> None:
+@given(data=st.data(), surface=surfaces, place=places, u=points_of_the_square)
+def test_samples_have_their_density(
+    kind: str, data: st.DataObject, surface: Receiver | None, place, u: tuple[float, float]
+) -> None:
     """In float32, as in a render: the density, and the radiance, that a ray along the sample finds."""
-    light = data.draw(KINDS[kind][0])
+    light = lit(data.draw(KINDS[kind][0]), surface)
     point = columns(*place).astype(f4)
     sample = light.sample_li(point, columns(*u).astype(f4))
     assume(0 < sample.pdf[0] < 1e4)
@@ -186,10 +202,12 @@ def test_samples_have_their_density(kind: str, data: st.DataObject, place, u: tu
     "kind", ["triangle", "two-sided rectangle", "sphere", "image", "sky", "sun", "constant"]
 )
 @few
-@given(data=st.data(), place=places, height=st.floats(0.2, 1))
-def test_densities_integrate_to_one(kind: str, data: st.DataObject, place, height: float) -> None:
+@given(data=st.data(), surface=surfaces, place=places, height=st.floats(0.2, 1))
+def test_densities_integrate_to_one(
+    kind: str, data: st.DataObject, surface: Receiver | None, place, height: float
+) -> None:
     """The midpoint rule over the sphere; edges of a light cross cells, of which the wrong half is counted."""
-    light = data.draw(KINDS[kind][0])
+    light = lit(data.draw(KINDS[kind][0]), surface)
     point = columns(*place).astype(f4)
     if isinstance(light, TriangleLights | RectangleLights):  # before its front
         middle = light.corner + (light.edge_u + light.edge_v) / light.middle
@@ -208,14 +226,15 @@ def test_densities_integrate_to_one(kind: str, data: st.DataObject, place, heigh
 
 
 @some
-@given(first=images(), second=suns, share=st.floats(0.1, 5), u=points_of_the_square)
-def test_sums_of_lights_at_infinity(first, second, share: float, u: tuple[float, float]) -> None:
+@given(first=images(), second=suns, surface=surfaces, share=st.floats(0.1, 5), u=points_of_the_square)
+def test_sums_of_lights_at_infinity(first, second, surface, share: float, u: tuple[float, float]) -> None:
     """The mixture of the parts' densities, by their power; the density and radiance at the sample."""
     parts = [first, second, ConstantEnvironment(RADIANCE * f4(share))]
-    whole, point = EnvironmentSum.of(parts), np.zeros((3, 1), f4)
+    whole, point = lit(EnvironmentSum.of(parts), surface), np.zeros((3, 1), f4)
     sample = whole.sample_li(point, columns(*u).astype(f4))
     power = np.array([part.power(1.0)[0] for part in parts])
-    due = sum(power / power.sum() * [float(part.pdf_li(point, sample.wi)[0]) for part in parts])
+    each = [float(lit(part, surface).pdf_li(point, sample.wi)[0]) for part in parts]
+    due = sum(power / power.sum() * each)
     assert sample.pdf[0] == pytest.approx(due, rel=1e-4)
     assert whole.pdf_li(point, sample.wi)[0] == sample.pdf[0]
     np.testing.assert_allclose(sample.radiance, sum(part.le(sample.wi) for part in parts), rtol=1e-5)
@@ -223,20 +242,25 @@ def test_sums_of_lights_at_infinity(first, second, share: float, u: tuple[float,
 
 @some
 @given(
-    first=triangles(), second=spheres(), place=places, choice=st.floats(0.01, 0.99), u=points_of_the_square
+    first=triangles(),
+    second=spheres(),
+    surface=surfaces,
+    place=places,
+    choice=st.floats(0.01, 0.99),
+    u=points_of_the_square,
 )
-def test_tables_of_lights(first, second, place, choice: float, u: tuple[float, float]) -> None:
+def test_tables_of_lights(first, second, surface, place, choice: float, u: tuple[float, float]) -> None:
     parts = [first, second, PointLightRecord(f4([[1], [2], [1]]), RADIANCE)]
     table, point = LightTable(parts, 2.0, "power"), columns(*place).astype(f4)
-    sample, light = table.sample_li(point, f4([choice]), columns(*u).astype(f4))
+    sample, light = table.sample_li(point, f4([choice]), columns(*u).astype(f4), surface)
     power = np.concatenate([part.power(2 * 3**0.5) for part in parts])
     chance = (power / power.sum())[light[0]]
-    own = parts[light[0]].sample_li(point, columns(*u).astype(f4))
+    own = lit(parts[light[0]], surface).sample_li(point, columns(*u).astype(f4))
     assert sample.pdf[0] == pytest.approx(chance * own.pdf[0], rel=1e-4)
     assume(light[0] != 2)
     assume(0 < own.pdf[0] < 1e4)
     assume(own.cos_light[0] > 0.05)
-    assert table.pdf_li(light, point, sample.wi)[0] == pytest.approx(sample.pdf[0], rel=5e-3)
+    assert table.pdf_li(light, point, sample.wi, surface)[0] == pytest.approx(sample.pdf[0], rel=5e-3)
 
 
 @pytest.fixture(scope="module")

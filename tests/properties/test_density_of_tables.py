@@ -13,15 +13,18 @@ from jacobians import (
     doubles,
     few,
     inner,
+    places,
     points_of_the_square,
     some,
+    surfaces,
     width_of_choice,
 )
 
 from wavefront.guiding.cells import GuideCells
 from wavefront.guiding.guide_table import GuideTable
 from wavefront.lights import PointLightRecord, TriangleLights, grid, samplers
-from wavefront.lights.base import Emitters
+from wavefront.lights.base import Emitters, Receiver
+from wavefront.lights.choice import LightSampler
 from wavefront.lights.samplers import (
     LIGHT_SAMPLERS,
     HalvedLightSampler,
@@ -35,7 +38,6 @@ from wavefront.stages.shade import Guidance
 
 f4 = np.float32
 some_weights = st.floats(0, 1).map(lambda x: 0.0 if x < 0.1 else x)  # some are 0
-places = st.tuples(*[st.floats(-2, 2, width=32)] * 3)
 
 
 def check_choice(choose, pmf, u: float, items: int) -> None:
@@ -148,20 +150,20 @@ counts, number = st.integers(1, 12), st.integers(0, 2**32)
 
 @pytest.mark.parametrize("name", sorted(LIGHT_SAMPLERS))
 @some
-@given(count=counts, seed=number, place=places, u=inner)
-def test_light_samplers(name: str, count: int, seed: int, place, u: float) -> None:
+@given(count=counts, seed=number, surface=surfaces, place=places, u=inner)
+def test_light_samplers(name: str, count: int, seed: int, surface, place, u: float) -> None:
     kinds = lights_of(count, seed)
     power = tree_of(kinds)[1]
     with patch.object(grid, "MOST_CELLS", 27):
         choice = LIGHT_SAMPLERS.find(name)(power, np.full(3, 2.0), IrradianceOf(kinds, 3.0))
-    check_light_sampler(choice, place, u, 2 * count)
+    check_light_sampler(choice, place, u, 2 * count, surface)
 
 
 @some
-@given(count=counts, seed=number, place=places, u=inner)
-def test_light_trees(count: int, seed: int, place, u: float) -> None:
+@given(count=counts, seed=number, surface=surfaces, place=places, u=inner)
+def test_light_trees(count: int, seed: int, surface, place, u: float) -> None:
     emitters, power = tree_of(lights_of(count, seed))
-    check_light_sampler(LightTreeSampler(emitters, power, 3.0), place, u, 2 * count)
+    check_light_sampler(LightTreeSampler(emitters, power, 3.0), place, u, 2 * count, surface)
 
 
 @some
@@ -178,15 +180,22 @@ def test_halved_light_samplers(first: np.ndarray, second: np.ndarray, u: float) 
     check_light_sampler(HalvedLightSampler(*parts), (0, 0, 0), u, 7)
 
 
-def check_light_sampler(choice, place, u: float, lights: int) -> None:
+def check_light_sampler(choice, place, u: float, lights: int, surface: Receiver | None = None) -> None:
     point = columns(*place).astype(f4)
 
-    def at(n: int) -> np.ndarray:
-        return np.repeat(point, n, 1)
+    def at(n: int) -> tuple[LightSampler, np.ndarray]:
+        lit = choice if surface is None else choice.lighting(surface.take(np.zeros(n, int)))
+        return lit, np.repeat(point, n, 1)
 
-    check_choice(
-        lambda v: choice.sample(at(v.size), v), lambda light: choice.pmf(light, at(light.size)), u, lights
-    )
+    def sample(v: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        lit, where = at(v.size)
+        return lit.sample(where, v)
+
+    def pmf(light: np.ndarray) -> np.ndarray:
+        lit, where = at(light.size)
+        return lit.pmf(light, where)
+
+    check_choice(sample, pmf, u, lights)
 
 
 @some
