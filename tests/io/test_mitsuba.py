@@ -205,6 +205,7 @@ def test_groups_and_instances() -> None:
     found = scene(group=group, **copies).shapes
     assert [type(each) for each in found] == [wf.Instance, wf.Sphere] * 2
     assert found[0].mesh is found[2].mesh
+    assert [each.name for each in found] == ["copy0", "copy0", "copy1", "copy1"]
     assert found[3].center.tolist() == [1, 2, 3]
     with pytest.raises(wf.SceneError, match=r"LoadLimits\.instances"):
         wf.from_mitsuba({"type": "scene", "group": group, **copies}, limits=wf.LoadLimits(instances=3))

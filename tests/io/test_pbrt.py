@@ -684,6 +684,12 @@ def test_dots_are_those_of_pbrt(tmp_path: Path) -> None:
     assert set(np.unique(np.stack([red, green, blue], 1), axis=0).ravel().tolist()) == {0, 0.25, 0.5, 0.75}
     cells = inside[25:375, 25:375].reshape(7, 50, 7, 50).mean((1, 3))  # whole cells around 1, 2, ... 7
     assert ((cells == 0) | (np.abs(cells - np.pi * 0.35**2) < 0.01)).all()
+    for column, row in np.argwhere(cells.T > 0):
+        part = np.argwhere(inside[25 + 50 * row :, 25 + 50 * column :][:50, :50]).mean(0)[::-1]
+        found = (part + 0.5) / 50 - 0.5  # from the middle of the cell
+        x, y = np.float32(column + 1), np.float32(row + 1)
+        shift = noise(np.array([x + 1.5, x + 4.5], np.float32), np.array([y + 2.8, y + 9.8], np.float32))
+        np.testing.assert_allclose(found, 0.15 * shift, atol=3e-3)
     # of Noise(x + 0.5, y + 0.5) of pbrt-v4, compiled: the rows are y from 1 on
     assert ["".join("01"[int(cell > 0)] for cell in row) for row in cells] == DOTS
 
@@ -894,6 +900,14 @@ def test_objects_are_placed_by_both_transforms(tmp_path: Path) -> None:
     assert [mesh.vertices[0].tolist() for mesh in flat] == [[2, 1, 1], [-1, 1, 1]]
     assert (front(flat[0])[0][:, 2] > 0).all()
     assert (front(flat[1])[0][:, 2] > 0).all()  # a reflection keeps the front
+
+
+def test_objects_are_mirrored_with_the_world(tmp_path: Path) -> None:
+    made = f'ObjectBegin "o" Translate 1 0 0 {SQUARE} ObjectEnd'
+    body = f'{made} Translate 2 3 4 Rotate 90 0 0 1 ObjectInstance "o"'
+    (mesh,) = load(tmp_path, body, 'Camera "perspective"').shapes
+    np.testing.assert_allclose(mesh.bounds, [[-2, 4, 4], [-1, 5, 4]], atol=1e-12)
+    assert (front(mesh.to_mesh())[0][:, 2] > 0).all()  # type: ignore[attr-defined]
 
 
 def test_balls_of_objects_are_exact_unless_they_are_stretched(tmp_path: Path) -> None:

@@ -448,6 +448,10 @@ def test_the_apex_of_a_cone_is_above(tmp_path: Path) -> None:
     (mesh,) = load(tmp_path, f'def Cone "solid"\n{{\n{PARTS}    uniform token axis = "Y"\n}}\n').shapes
     top = mesh.vertices[mesh.vertices[:, 1] > 2.99]
     np.testing.assert_allclose(top, [[0, 3, 0]] * len(top), atol=1e-12)
+    side = mesh.normals[:, 1] > -0.9  # its normals are perpendicular to the lines to the apex
+    along = (np.array([0, 3, 0]) - mesh.vertices[side]) * mesh.normals[side]
+    np.testing.assert_allclose(along.sum(1), 0, atol=1e-9)
+    assert side.sum() > 200
 
 
 def test_planes(tmp_path: Path) -> None:
