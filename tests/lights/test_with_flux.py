@@ -28,6 +28,7 @@ LIGHTS = {
     "point": wf.PointLight((0, 1, 0), (1, 0.5, 0.2)),
     "points": wf.PointLights([(0, 1, 0), (1, 0, 0)], [(1, 0.5, 0.2), (0, 3, 1)]),
     "spot": wf.SpotLight((0, 1, 0), (1, 0.5, 0.2), direction=(0, -1, 0), angle=100, blend=0.5),
+    "step spot": wf.SpotLight((0, 0, 0), 3, direction=(0, 1, 0), angle=90, blend=0.6, falloff="smoothstep"),
     "linear spot": wf.SpotLight((0, 0, 0), 3, direction=(0, 1, 0), angle=150, blend=0.8, falloff="linear"),
 }
 
