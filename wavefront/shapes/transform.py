@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..arrays.elementary import sin_cos_turns
-from ..arrays.vec import Doubles, Ints, cross
+from ..arrays.vec import Doubles, Floats, Ints, cross
 from ..core.errors import SceneError, as_array, finite_array, number, one_of
 
 Matrix = Doubles  # (4, 4), or several
@@ -87,7 +87,7 @@ def moved(
     return _rows_by(linear, vertices) + shift, faces, normals
 
 
-def _rows_by(linear: Doubles, rows: Doubles) -> Doubles:
+def _rows_by(linear: Floats, rows: Doubles) -> Doubles:
     """Return rows (n, 3), each multiplied by a matrix (3, 3).
 
     Component by component: the threads of BLAS, which has other bits elsewhere, wait for each other on a busy
