@@ -164,17 +164,17 @@ def pretend(
     return tried
 
 
-def chosen(scene: wf.Scene, learned: bool = False, **settings: Any) -> choice.Choice:
-    """Return what is chosen for a scene, for which a guide may have been learned."""
+def chosen(scene: wf.Scene, **settings: Any) -> choice.Choice:
+    """Return what is chosen for a scene."""
     compiled = compile_scene(scene, scene.accelerators.maker("numpy"), mis=True)
     assert scene.camera is not None
     options, view = Settings(**settings), compiled.view(scene.camera)
-    table = choice.learn_guide(options, compiled, view) if options.values["guide"] is True else None
+    table = choice.learn_guide(options, compiled, view) if options.values["guide"] else None
 
     def run(jobs: list[TrialJob]) -> list[TrialPart]:
         return [job.trace(compiled, SobolSampler, table) for job in jobs]
 
-    return choice.choose(options, compiled, view, learned or table is not None, run)
+    return choice.choose(options, compiled, view, table is not None, run)
 
 
 @pytest.mark.parametrize(
@@ -552,40 +552,15 @@ def test_the_error_of_a_cost() -> None:
     assert pairs[0][0].cost_error(nothing, 0) == 0
 
 
-@pytest.mark.parametrize(
-    ("build", "least", "pays"),
-    [
-        (open_scene, 0, False),
-        (lamp_at_the_ceiling, 192 * 192 + 1, False),
-        pytest.param(lamp_at_the_ceiling, 192 * 192, True, marks=pytest.mark.slow),
-    ],
-    ids=["open", "small", "rare light"],
-)
-def test_a_guide_is_learned_where_it_may_pay(
-    build: Callable[[tuple[int, int]], wf.Scene], least: int, pays: bool, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    """In pictures that are large enough, where light is rare; the picture is that with or without it."""
-    learned = []
-    learn = choice.train
-    monkeypatch.setattr(choice, "LEAST_OF_GUIDE", least)
-    monkeypatch.setattr(choice, "train", lambda *args: learned.append(1) or learn(*args))
-    image = render(build(SIZE), 1)
-    assert (image.metadata["guide"], image.metadata["guided"], len(learned)) == ("auto", pays, int(pays))
-    assert (image.metadata["hint"] == choice.GUIDE_HINT) is (least > 192 * 192)
-    how = {"branches": image.metadata["branches"]} if not image.metadata["reuse"] else {"reuse": True}
-    assert np.array_equal(image.rgb, render(build(SIZE), 1, guide=pays, **how).rgb)
-
-
-def test_a_guide_that_is_learned_must_pay(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Against the best without it, by the rays that the same tiles take; there is no hint at it then."""
-    monkeypatch.setattr(trial, "integrator_for", lambda integrator, *setting: integrator)
-    monkeypatch.setattr(trial, "li_twins", lambda *wave, table: li_twins(*wave))
-    for part, guided in ((0.9, False), (0.8, True)):
-        costs = {PLAIN: 2, SHARED: 1, (False, True): 2, (True, True): part}
-        tried = pretend(monkeypatch, costs)
-        found = chosen(cornell_box(SIZE), learned=True)
-        assert (found.guided, found.reuse, found.hint) == (guided, True, None)
-        assert set(tried) == set(costs)
+@pytest.mark.slow
+def test_a_guide_is_used_where_it_pays() -> None:
+    """Under an open sky it is not; the picture is that without or with it."""
+    for scene, pays in ((open_scene(), False), (lamp_at_the_ceiling(), True)):
+        image = render(scene, guide="auto")
+        assert image.metadata["guided"] is pays
+        assert image.metadata["guide"] == "auto"
+        same = render(scene, guide=pays, branches=image.metadata["branches"])
+        assert np.array_equal(image.rgb, same.rgb)
 
 
 def test_renders_go_on_with_the_same_decision(tmp_path: Path) -> None:

@@ -13,7 +13,7 @@ from ..arrays.soa import soa
 from ..camera import Camera
 from ..compile.scene import CompiledScene
 from ..guiding import GuideTable
-from ..integrators.training import PATHS, train
+from ..integrators.training import train
 from ..integrators.tuning import BRANCHES, JobsRunner, Run, Trial
 from ..sampling.sampler import make_sampler
 from ..sampling.tiles import MEMBERS, SIDE, STRIDE
@@ -31,7 +31,7 @@ GAIN_OF_BRANCHES = 0.95  # likewise; costs of branches are known better, since o
 OUTLIERS = 0.02  # part of the pixels, the noisiest, that do not count
 OUTLIERS_OF_SHARED = 0.005  # likewise, for re-use, which may bring most where few pixels hold the noise
 GAIN_BESIDE_GLOSS = 0.6  # of re-use beside sharp lobes: they gain little, and trials miss it
-LEAST_OF_GUIDE = PATHS  # pixels of pictures that get a guide by themselves: training takes a sample of each
+GUIDE_TILES = 128  # whatever the size of the picture: training takes longer anyway
 RARE_LIGHT = 1.0  # relative variance of a pixel of four samples, from where on light is hard to find
 MOST_PATHS = 0.4  # part of the paths that must meet second points which can be shared
 
@@ -43,7 +43,6 @@ class Choice:
     branches: int = 1
     reuse: bool = False
     guided: bool = False
-    light_is_rare: bool = False  # in the tuning run of plain paths, if there was one
     hint: str | None = None  # what may pay besides
 
     @property
@@ -79,7 +78,7 @@ def choose(
     camera
         In the unit of the compiled scene.
     has_guide
-        Whether there is something to guide them. With `guide="auto"` it has to pay.
+        Whether there is something to guide them.
     run
         Does the jobs of trials.
     workers
@@ -89,30 +88,20 @@ def choose(
     asked = Choice(1 if branches == AUTO else int(branches), reuse, has_guide)
     whole = camera.cropped((0, 0, *camera.resolution))  # a window is a part of the same picture
     seed, bounces = settings.training_seed(1), settings.values["max_bounces"]
-    if not settings.is_full or not _tries_something(settings, scene, whole):
-        return asked
-    trial = Trial(whole, seed, bounces, run, workers=workers)
-    if has_guide and settings.values["guide"] == AUTO:
-        free, guided = (
-            _tried(settings, scene, whole, trial, replace(asked, guided=each)) for each in (False, True)
-        )
-        return guided if _cost(trial, guided, free) < GAIN else replace(free, hint=None)
-    return _tried(settings, scene, whole, trial, asked)
-
-
-def may_guide(settings: Settings, camera: Camera, choice: Choice) -> bool:
-    """Return whether a guide is to be learned and tried, given how paths go on without one."""
-    wanted = settings.values["guide"] == AUTO and not choice.guided and camera.sensor is None
-    return wanted and choice.light_is_rare and camera.size[0] * camera.size[1] >= LEAST_OF_GUIDE
+    if settings.is_full and has_guide and settings.values["guide"] == AUTO:
+        trial = Trial(whole, seed, bounces, run, GUIDE_TILES, workers)
+        plain, guided = (_branched(settings, trial, replace(asked, guided=each)) for each in (False, True))
+        return guided if _cost(trial, guided, plain) < GAIN else plain
+    if settings.is_full and _tries_something(settings, scene, whole):
+        return _tried(settings, scene, whole, Trial(whole, seed, bounces, run, workers=workers), asked)
+    return asked
 
 
 def _tried(settings: Settings, scene: CompiledScene, camera: Camera, trial: Trial, plain: Choice) -> Choice:
     """Return whether pixels share paths, or else how many branches these have; `plain` is neither."""
     found = trial.run(False, plain.guided)
-    unguided = trial.run(False, False) if settings.values["guide"] == AUTO else found
-    light_is_rare = unguided.mean_variance(OUTLIERS_OF_SHARED) > RARE_LIGHT
-    hint = GUIDE_HINT if light_is_rare and not plain.guided else None
-    plain = replace(plain, light_is_rare=light_is_rare, hint=hint)
+    light_is_rare = found.mean_variance(OUTLIERS_OF_SHARED) > RARE_LIGHT
+    plain = replace(plain, hint=GUIDE_HINT if light_is_rare and not plain.guided else None)
     branched = _branched(settings, trial, plain)
     if not _may_reuse(settings, camera) or not _may_gain(scene, found, light_is_rare):
         return branched

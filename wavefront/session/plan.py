@@ -17,7 +17,7 @@ from ..scheduling.executors import ExecutorLike, needs_pickling
 from ..scheduling.payload import can_be_sent
 from ..scheduling.tracing import Tracer
 from ..settings import Settings
-from .choice import Choice, choose, learn_guide, may_guide
+from .choice import Choice, choose, learn_guide
 from .hints import caustics_hint
 from .prepared_scene import PreparedScene
 
@@ -37,21 +37,9 @@ class Plan:
 
 
 def trained_guide(settings: Settings, scene: PreparedScene, camera: Camera) -> GuideTable | None:
-    """Return the table that guides the paths that a camera sees; None if none is asked for."""
-    if settings.values["guide"] is not True or not settings.is_full:
+    """Return the table that may guide the paths that a camera sees; None if none is asked for."""
+    if not settings.values["guide"] or not settings.is_full:
         return None
-    return _learned(settings, scene, camera)
-
-
-def tried_guide(plan: Plan, camera: Camera) -> GuideTable | None:
-    """Return a table that may guide the paths that a camera sees; None where it would not pay."""
-    if not may_guide(plan.settings, camera, plan.choice):
-        return None
-    return _learned(plan.settings, plan.scene, camera)
-
-
-def _learned(settings: Settings, scene: PreparedScene, camera: Camera) -> GuideTable | None:
-    """Return the table of a training pass."""
     with phase("learning where light comes from", settings.values["progress"]), single_threaded_blas:
         return learn_guide(settings, scene.compiled, scene.compiled.view(camera))
 

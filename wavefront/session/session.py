@@ -38,7 +38,7 @@ from .final_checks import (
     warn_of_long_paths,
 )
 from .hints import Hints
-from .plan import make_plan, trained_guide, tried_guide, with_choice
+from .plan import make_plan, trained_guide, with_choice
 from .prepared_scene import PreparedScene
 from .sole_use import SoleUse
 
@@ -120,22 +120,12 @@ class Session:
                     sums = aside.submit(
                         Accumulator, camera.size, self._plan.tracer.recorded_aovs, values["caustics"]
                     )
-                    self._choose(camera)
+                    self._plan = with_choice(self._plan, camera, self._run_trial)
                 self._begin_picture(camera, sums.result(), begin)
         except BaseException:
             with self.interrupt_handler:
                 self._pool.close()
             raise
-
-    def _choose(self, camera: Camera) -> None:
-        """Find out how the paths of a view go on; where a guide may pay, workers start anew with it."""
-        self._plan = with_choice(self._plan, camera, self._run_trial)
-        table = tried_guide(self._plan, camera)
-        if table is not None:
-            self._pool.close()
-            self._plan = make_plan(self._plan.settings, self._scene, camera, table)
-            self._make_pool()
-            self._plan = with_choice(self._plan, camera, self._run_trial)
 
     def _make_pool(self) -> None:
         """Make a pool of workers, which start with the first job if not before."""
@@ -319,7 +309,7 @@ class Session:
                 self._make_pool()
             else:
                 self._plan = replace(self._plan, budget=budget)
-            self._choose(camera)
+            self._plan = with_choice(self._plan, camera, self._run_trial)
             self._begin_picture(camera, accumulator, begin)
 
     def stop(self) -> None:

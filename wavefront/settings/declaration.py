@@ -354,14 +354,13 @@ class RenderSettings(TypedDict, total=False):
     guide: Annotated[
         bool | str,
         Setting(
-            AUTO,
+            False,
             "Path guiding: learn from a training pass of 262144 paths where light comes from, and choose "
             'directions by that; only for "full". The training takes a second or two. Guiding pays where '
             "light comes through narrow openings or after several reflections: docs/guiding.md has "
-            'figures. What is learned depends on the scene, the camera and the seed alone. "auto" learns '
-            "where the tuning run finds that light is rare, in pictures of 262144 pixels and more, and "
-            'guides if a second one says that it pays; `metadata["guided"]` says what it found.',
-            option="learn where light comes from: yes, no, or auto: where a tuning run says that it pays",
+            'figures. What is learned depends on the scene, the camera and the seed alone. "auto" guides '
+            'only where a short tuning run says that it pays; `metadata["guided"]` says what it found.',
+            option="path guiding: learn where light comes from, for scenes with much indirect light",
             check=auto_or(check_flag),
             identity=True,
         ),

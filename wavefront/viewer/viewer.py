@@ -283,7 +283,6 @@ def _opened(
     wanted = (*((aovs,) if isinstance(aovs, str) else aovs), *VIEWER_AOVS)
     width, height = (max(1, side // FIRST_DIVISOR) for side in viewpoint.camera.resolution)
     settings |= {"camera": viewpoint.camera, "size": (width, height), "aovs": wanted, "progress": False}
-    settings.setdefault("guide", False)  # each view would learn one before its first picture
     if settings.get("wave_size") is None:
         settings["wave_size"] = WAVE_SIZE
     if settings.get("executor") is None:
