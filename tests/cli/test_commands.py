@@ -160,6 +160,7 @@ def test_a_scene_that_fails_does_not_stop_the_others(mesh: Path, capsys) -> None
     ("scenes", "options", "message"),
     [
         (("a.obj", "b.obj"), ["-o", "out.png"], "out.png: is one path for the pictures of 2 scenes"),
+        (("a.obj", "b.png"), [], "b.png: is a picture in the place of a scene; -o b.png writes one"),
         (("a.obj", "x/a.ply"), ["-o", "."], "a.png: is the picture of a.obj and of x/a.ply"),
         (("a.obj", "b.obj"), ["-o", ".", "--checkpoint", "a.wfck"], "--checkpoint is for one scene"),
         (("a.obj", "b.obj"), ["-o", "{}.bmp"], "a.bmp: extension is '.bmp'"),

@@ -7,6 +7,7 @@ import tempfile
 from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 
+from ..codecs.images import IMAGE_WRITERS
 from ..core.errors import Interrupted, RenderError, SaveError
 from ..core.files import make_folder
 from ..image import Image
@@ -43,12 +44,15 @@ def output_paths(scenes: Sequence[str], output: str) -> list[str]:
     Raises
     ------
     SaveError
-        If there are several scenes and one path, two pictures would have one name, or the folder cannot be
+        If there are several scenes and one path, a scene is a picture, two pictures would have one name, or the folder cannot be
         made.
     """
     is_folder = output.endswith(("/", os.sep)) or os.path.isdir(output)
     if not is_folder and PLACE not in output:
         if len(scenes) > 1:
+            last = scenes[-1]
+            if Path(last).suffix.lower() in IMAGE_WRITERS:
+                raise SaveError(f"{last}: is a picture in the place of a scene; -o {last} writes one")
             raise SaveError(
                 f"{output}: is one path for the pictures of {len(scenes)} scenes; "
                 f"-o must be a folder such as out/, or a path such as out/{PLACE}.exr"
