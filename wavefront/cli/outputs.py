@@ -44,8 +44,8 @@ def output_paths(scenes: Sequence[str], output: str) -> list[str]:
     Raises
     ------
     SaveError
-        If there are several scenes and one path, a scene is a picture, two pictures would have one name, or the folder cannot be
-        made.
+        If there are several scenes and one path, a scene is a picture, two pictures would have one name, or
+        the folder cannot be made.
     """
     is_folder = output.endswith(("/", os.sep)) or os.path.isdir(output)
     if not is_folder and PLACE not in output:
