@@ -257,6 +257,7 @@ def test_tables_of_lights(first, second, surface, place, choice: float, u: tuple
     chance = (power / power.sum())[light[0]]
     own = lit(parts[light[0]], surface).sample_li(point, columns(*u).astype(f4))
     assert sample.pdf[0] == pytest.approx(chance * own.pdf[0], rel=1e-4)
+    assert table.pmf(light, point, surface)[0] == pytest.approx(chance, rel=1e-4)
     assume(light[0] != 2)
     assume(0 < own.pdf[0] < 1e4)
     assume(own.cos_light[0] > 0.05)
