@@ -257,6 +257,19 @@ def test_the_density_of_a_texel_at_a_pole_is_its_mean() -> None:
 SUNS = [wf.DirectionalLight((1, -1, 0.2), 1.0, angle=30), wf.DirectionalLight((0.9, -1, 0.3), 0.5, angle=20)]
 
 
+@pytest.mark.parametrize("rows", ["centers", "poles"])
+@pytest.mark.parametrize("filter", ["nearest", "bilinear"])
+def test_densities_are_those_of_one_pass_over_the_image(filter: str, rows: str, monkeypatch) -> None:
+    """Light is summed by some rows at a time; here by all, by three of 16 texels, and by one."""
+    records = []
+    for texels in (1000, 50, 1):
+        monkeypatch.setattr("wavefront.lights.image.CHUNK", texels)
+        records.append(wf.Environment(noise(), filter=filter, rows=rows).record(ORIGIN))
+    for record in records[1:]:
+        assert (record.texels.weights() == records[0].texels.weights()).all()
+        assert record.mean == pytest.approx(records[0].mean)
+
+
 @pytest.mark.parametrize("suns", [[], SUNS])
 def test_pdf_integrates_to_one(suns: list) -> None:
     """Summed over a fine grid of the sphere, for a map with a small sun, and a sky with two more."""

@@ -26,6 +26,7 @@ from .infinite import InfiniteLight, at_infinity, through_scene, turned
 from .product import NO_NORMAL, CosineProduct, octahedral_bins
 
 LEAST_VARIANCE = 0.1  # of radiance over its squared mean, all around, that is worth light samples
+CHUNK = 1 << 14  # texels whose light is summed at a time, so that sums take no fresh memory
 
 
 @soa
@@ -68,12 +69,16 @@ class ImageEnvironment(InfiniteLight):
         sin_middle, _ = sin_cos_turns((edges[:-1] + edges[1:]) / (4 * bands))
         sin_half, _ = sin_cos(np.pi * np.diff(edges) / (2 * bands))
         step = 2 * sin_middle * sin_half  # cos of one edge − cos of the next
-        weights, mean = np.zeros(pixels.shape[:2]), []
-        for channel, part in zip(np.moveaxis(pixels, -1, 0), luminance(np.eye(3)), strict=True):
-            texels = channel if filter == "nearest" else _spread(channel, poles)
-            shares = texels * (step / (2 * pixels.shape[1]))[:, None]  # of the sphere
-            mean.append(shares.sum())
-            weights += part * shares
+        weights, mean = np.empty(pixels.shape[:2]), np.zeros(3)
+        around = np.concatenate([[1] if poles else [0], np.arange(height), [-2] if poles else [-1]])
+        at_a_time = max(1, CHUNK // pixels.shape[1])
+        for start in range(0, height, at_a_time):
+            rows = slice(start, start + at_a_time)
+            nearest = filter == "nearest"
+            texels = pixels[rows] if nearest else _spread(pixels[around[start : rows.stop + 2]])
+            shares = texels * (step[rows] / (2 * pixels.shape[1]))[:, None, None]  # of the sphere
+            mean += shares.sum((0, 1))
+            weights[rows] = luminance(np.moveaxis(shares, -1, 0))
         if not weights.any():
             raise SceneError("every pixel of the Environment is black; Environment(0) is darkness")
         return cls(
@@ -82,7 +87,7 @@ class ImageEnvironment(InfiniteLight):
             density=(1 / (2 * np.pi * height * step)).astype(f4),
             top=sin_cos_turns(edges[:-1] / (2 * bands))[1],
             step=step,
-            mean=np.array(mean, f4).reshape(3, 1),
+            mean=mean.astype(f4).reshape(3, 1),
             rotation=None if rotation is None else rotation.astype(f4),
             poles=poles,
         )
@@ -171,17 +176,15 @@ class ImageEnvironment(InfiniteLight):
         return self.image.lookup(np.stack([x, f4(1) - y]))
 
 
-def _spread(pixels: Floats, poles: bool) -> Doubles:
-    """Mean of the bilinear lookup within each texel (H, W): its neighbors count ⅛, itself ¾, both ways.
+def _spread(pixels: Floats) -> Doubles:
+    """Mean of the bilinear lookup within each texel but those of the first and last row, (H + 2, W, 3).
 
-    Half a texel at a pole has the weights of a whole one between equal rows. The mean is positive wherever
-    the lookup is.
+    The neighbors of a texel count ⅛, itself ¾, both ways. Half a texel at a pole has the weights of a whole
+    one between equal rows. The mean is positive wherever the lookup is.
     """
     texels = pixels.astype(np.float64)
     texels = 0.75 * texels + 0.125 * (np.roll(texels, 1, 1) + np.roll(texels, -1, 1))
-    first, last = (texels[1:2], texels[-2:-1]) if poles else (texels[:1], texels[-1:])
-    above, below = np.vstack([first, texels[:-1]]), np.vstack([texels[1:], last])
-    return 0.75 * texels + 0.125 * (above + below)
+    return 0.75 * texels[1:-1] + 0.125 * (texels[:-2] + texels[2:])
 
 
 def environment_pixels(source: Any) -> Floats:
@@ -211,7 +214,7 @@ def environment_pixels(source: Any) -> Floats:
     check_size(codes.shape[0], codes.shape[1])
     is_coded = codes.dtype in (np.uint8, np.uint16)
     with np.errstate(over="ignore"):  # an overflow is infinite, and is reported below
-        pixels = codes_to_linear(codes) if is_coded else codes.astype(f4)
+        pixels = codes_to_linear(codes) if is_coded else codes.astype(f4, copy=False)
     if codes.shape[2] in (2, 4):
         clear = int((pixels[..., -1] != 1).sum())
         if clear:

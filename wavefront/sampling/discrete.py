@@ -25,8 +25,8 @@ def _checked(name: str, weights: ArrayLike, ndim: int) -> Doubles:
         raise SceneError(
             f"{name} must have {plural(ndim, 'dimension')} and at least one item, got shape {array.shape}"
         )
-    bad = np.argwhere(~(np.isfinite(array) & (array >= 0)))
-    if len(bad):
+    if not (array.min() >= 0 and np.isfinite(array.max())):
+        bad = np.argwhere(~(np.isfinite(array) & (array >= 0)))
         where = "".join(f"[{i}]" for i in bad[0])
         raise SceneError(f"{name}{where} is {array[tuple(bad[0])]}; it must be finite and at least 0")
     if not array.any():
