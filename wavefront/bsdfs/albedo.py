@@ -107,6 +107,18 @@ def _reflected(wo: Floats, roughness: Floats, u: Floats) -> tuple[Floats, Floats
 
 
 @cache
+def facet_cosines() -> Floats:
+    """Mean cosine between wo and the facets of GGX that reflect it."""
+
+    def row(wo: Floats, roughness: Floats, u: Floats) -> tuple[Floats, Floats]:
+        m, shown = _reflected(wo, roughness, u)
+        return shown * np.minimum(dot(wo, m), f4(1)), shown
+
+    cosines, weights = tabulate(row)
+    return cosines / weights
+
+
+@cache
 def gloss_tables() -> tuple[Floats, Floats, Floats, Floats]:
     """Albedo of GGX with Schlick's Fresnel, as F0·A + F90·B: A, B, and their cosine-weighted means."""
 

@@ -77,6 +77,11 @@ def fresnel_channels(glass: Dielectric, cos: Floats) -> tuple[Floats, Floats, Fl
     return reflected, cos_refracted, eta
 
 
+def mean_of_channels(reflected: Floats) -> Floats:
+    """Return the mean of a reflectance over the channels, if it has any, (n,)."""
+    return reflected if reflected.ndim == 1 else _total(reflected) * f4(1 / 3)
+
+
 def _shares(glass: Dielectric, wo: Floats) -> Floats:
     """Return the probabilities of the channels, (3, n)."""
     return np.broadcast_to(glass.shares, wo.shape)

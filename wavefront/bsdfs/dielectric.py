@@ -15,7 +15,7 @@ from ..core.suggestions import suggests_keywords
 from ..textures.base import BaseTexture
 from ..textures.parameter import Color, Scalar, refractive_index, refractive_indices
 from .base import BsdfSample, weigh
-from .channels import evaluate_channels, fresnel_channels, sample_channels
+from .channels import evaluate_channels, fresnel_channels, mean_of_channels, sample_channels
 from .energy import Loss, gain, loss
 from .fresnel import fresnel_dielectric
 from .microfacet import reflect, refract
@@ -71,8 +71,8 @@ class Dielectric(RefractiveBsdf):
     film_thickness, film_ior
         As for `Conductor`: a film on the outside; both indices are relative to what surrounds the shape.
     multiscatter
-        Return what microfacets scatter more than once, except with dispersion, a film, an index by texture,
-        or in scenes with a `priority`. Without it, for index 1.5, seen along the normal, 0.1 % from outside
+        Return what microfacets scatter more than once, except with dispersion, an index by texture, or in
+        scenes with a `priority`. Without it, for index 1.5, seen along the normal, 0.1 % from outside
         and 1 % from inside are lost at roughness 0.32, 1 % and 7 % at 0.5, 3 % and 25 % at 0.71, 11 % and
         58 % at 1. A whole sphere in uniform light loses 0.06 % at 0.1, 4 % at 0.32, 18 % at 0.5, 41 % at
         0.71, 65 % at 1.
@@ -126,7 +126,7 @@ class Dielectric(RefractiveBsdf):
         self.shares = np.full((3, 1), 1 / 3, f4)  # (3, n) probability to follow each channel
         self.before = np.ones(1, f4)  # (n,) or (3, n) index on the side of wo
         self.specular = self.specular or bool(straight)
-        self.again = self.multiscatter and constant and not (self._split or self.specular)
+        self.again = self.multiscatter and constant and not (self.dispersive or self.specular)
         self.boundary = float(self.ior[0]) if self.again else None  # the index that its tables are for
         self.eta = self.ior  # (n,), (1,) or (3, n) index beyond / before; unbound, wo is outside
 
@@ -161,7 +161,7 @@ class Dielectric(RefractiveBsdf):
         """Return `f`, for radiance, and `pdf` (Walter et al. 2007, eqs. 20 and 21); 0 if smooth."""
         if self.specular:
             return np.zeros_like(wi), np.zeros_like(wi[2])
-        return evaluate_channels(self, wo, wi) if self._split else self._evaluate_rough(wo, wi)
+        return evaluate_channels(self, wo, wi) if self.dispersive else self._evaluate_rough(wo, wi)
 
     def _evaluate_rough(self, wo: Floats, wi: Floats, chance: Floats | None = None) -> tuple[Floats, Floats]:
         """Evaluate, with the probability (n,) of the lobe of multiple scattering, if it is known."""
@@ -171,10 +171,10 @@ class Dielectric(RefractiveBsdf):
         if self.again:
             value = value * gain(self, wo, wi, None, both)
         through, through_density, through_cos, valid = facets.refraction_lobe(wo, wi, self.eta, both)
-        reflected, _ = fresnel_dielectric(np.where(valid, through_cos, cos), self.eta)
-        transmitted = f4(1) - reflected
-        f = value * reflected + through * transmitted  # one of them is 0
-        pdf = density * reflected + through_density * transmitted
+        reflected, _ = self._fresnel(np.where(valid, through_cos, cos))
+        share = mean_of_channels(reflected)
+        f = value * reflected + through * (f4(1) - reflected)  # one of them is 0
+        pdf = density * share + through_density * (f4(1) - share)
         if self.again:
             added, spread, chance = self._loss().lobe(self, wo, wi, self._inside, both, chance)
             f, pdf = f + added, pdf * (f4(1) - chance) + spread * chance
@@ -186,6 +186,13 @@ class Dielectric(RefractiveBsdf):
             return self.reflectance
         return np.where(wi[2] < 0, self.transmittance, self.reflectance)
 
+    def _fresnel(self, cos: Floats) -> tuple[Floats, Floats]:
+        """Return the reflectance, with a film (3, n), and the refracted cosine, (n,) each."""
+        if not self.has_film:
+            return fresnel_dielectric(cos, self.eta)
+        reflected, cos_refracted, _ = fresnel_channels(self, cos)
+        return reflected, cos_refracted[0]
+
     def _loss(self) -> Loss:
         assert self.boundary is not None
         return loss(self.shape, self.boundary)
@@ -196,7 +203,7 @@ class Dielectric(RefractiveBsdf):
         Refracted radiance is divided by η², as the light fills a cone of another solid angle
         (Veach 1997, *Robust Monte Carlo Methods for Light Transport Simulation*, §5.2).
         """
-        if self._split:
+        if self.dispersive or (self.has_film and self.specular):
             return sample_channels(self, wo, u)
         return self._sample_smooth(wo, u) if self.specular else self._sample_rough(wo, u)
 
@@ -217,14 +224,14 @@ class Dielectric(RefractiveBsdf):
     def _sample_rough(self, wo: Floats, u: Floats) -> BsdfSample:
         m = self.facets().visible_normals(wo, u)
         cos = np.maximum(dot(wo, m), f4(0))
-        reflected, cos_refracted = fresnel_dielectric(cos, self.eta)
+        reflected, cos_refracted = self._fresnel(cos)
         choice, chance = u[2], None
         if self.again:
             chance = self._loss().at(self, wo, self._inside)
             again = choice < chance
             choice = np.where(again, choice, choice - chance) / np.where(again, chance, f4(1) - chance)
             choice = np.minimum(choice, BELOW_ONE)
-        reflects = choice < reflected
+        reflects = choice < mean_of_channels(reflected)
         wi = np.where(reflects, reflect(wo, m), refract(wo, m, cos, cos_refracted, self.eta))
         if self.again:
             lanes = np.flatnonzero(again)

@@ -18,7 +18,7 @@ from ..arrays.vec import INV_PI, TINY, Bools, Floats, dot, f4
 from ..core.parameter import Parameter, flag, parametrized
 from ..textures.base import BaseTexture
 from ..textures.parameter import Color, Scalar, color, refractive_index, scalar
-from .albedo import dielectric_albedo
+from .albedo import dielectric_albedo, facet_cosines, gloss_tables, lookup
 from .base import BsdfSample, JointBsdf
 from .energy import Shape, mean_over_cosines
 from .fresnel import fresnel_dielectric
@@ -120,7 +120,7 @@ class OpenPBRBsdf(JointBsdf):
         again = self.multiscatter
         layers._metal_again = again and "base_metalness" in used
         layers._sheet_again = again and self.transmissive and self.thin
-        known = not (self.thin or layers.has_film or textures & {"specular_ior", "specular_weight"})
+        known = not (self.thin or textures & {"specular_ior", "specular_weight"})
         layers._clear_again = again and self.transmissive and known
         if layers._clear_again:
             layers._boundary = float(bent(weighted_index(self.specular_ior, self.specular_weight))[0])
@@ -270,11 +270,13 @@ class Layers(Principled):
 
     def _gloss(self, cos: Floats) -> Floats:
         plain, _ = fresnel_dielectric(cos, self.index_below)
-        if not self.has_film:
-            return self.specular_color * plain
+        return self.specular_color * (plain + self._film_adds(cos) if self.has_film else plain)
+
+    def _film_adds(self, cos: Floats) -> Floats:
+        """Return what the film adds to the reflectance of the opaque dielectric, (3, n)."""
         root = (self.index_below - f4(1)) / (self.index_below + f4(1))
         film = self._film(cos, np.broadcast_to(root * root, cos.shape))
-        return self.specular_color * (plain + (film - plain) * self.film_weight)
+        return (film - fresnel_dielectric(cos, self.index_below)[0]) * self.film_weight
 
     def _matte(self, wo: Floats, wi: Floats, part: Floats) -> Floats:
         above = part * np.where(wi[2] > 0, INV_PI, f4(0))
@@ -284,17 +286,18 @@ class Layers(Principled):
         vars(rough).update(reflectance=self.diffuse, sigma=self.diffuse_roughness)
         return rough.f(wo, wi) * part + self.subsurface * above
 
-    def _under_gloss(self, wo: Floats, wi: Floats) -> Floats:
-        """Part of the light that reaches the diffuse base and leaves it again, as in `Principled`, (n,)."""
-        if self.has_film:
-            passed = [f4(1) - self._gloss(np.abs(w[2])).max(0) for w in (wo, wi)]
-            return passed[0] * passed[1]
-        roughness, tint = self.mean_roughness(), self.specular_color.max(0)
-        one, other, mean = (
-            f4(1) - tint * dielectric_albedo(self.index_below, roughness, cos)
-            for cos in (wo[2], np.abs(wi[2]), None)
-        )
-        return one * other / mean
+    def _passed(self, roughness: Floats, cos: Floats | None) -> Floats:
+        tint = self.specular_color.max(0)
+        passed = f4(1) - tint * dielectric_albedo(self.index_below, roughness, cos)
+        if not self.has_film or cos is None:
+            return passed
+        a, b, _, _ = gloss_tables()
+        facet = lookup(facet_cosines(), roughness, cos)
+        shown = lookup(a, roughness, cos) + lookup(b, roughness, cos)
+        return passed - tint * shown * self._film_adds(facet)
+
+    def _mean_passed(self, roughness: Floats, cos: Floats) -> Floats:
+        return super()._mean_passed(roughness, cos) if self.has_film else self._passed(roughness, None)
 
     def _metal(self, cos: Floats) -> Floats:
         """Reflectance of the metal, (3, n), by the F82 tint (specification, section on metal)."""

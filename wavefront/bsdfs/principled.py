@@ -14,8 +14,9 @@ from ..core.parameter import Parameter, flag, optional, parametrized
 from ..sampling.warp import cosine_hemisphere, cosine_hemisphere_pdf
 from ..textures.base import BaseTexture
 from ..textures.parameter import Color, Scalar, color, refractive_index, scalar
-from .albedo import gloss_tables, lookup
+from .albedo import facet_cosines, gloss_tables, lookup
 from .base import BsdfSample, weigh
+from .channels import mean_of_channels
 from .dielectric import LEAST_BEND
 from .energy import Loss, Shape, gain, loss, mean_over_cosines, part_kept
 from .fresnel import fresnel_dielectric, fresnel_sheet
@@ -84,8 +85,8 @@ class Principled(Microfacets):
         exactly, also without multiple scattering.
     multiscatter
         Return what the microfacets of metal and clear parts scatter more than once, as in `Conductor` and
-        `Dielectric`; not in clear parts that bend light with an index by texture or a film, or in scenes with
-        a `priority`.
+        `Dielectric`; not in clear parts that bend light with an index by texture, or in scenes with a
+        `priority`.
 
     Raises
     ------
@@ -131,7 +132,7 @@ class Principled(Microfacets):
         again = self.multiscatter and self.conserve_energy
         self._metal_again = again and _used(self.metallic)
         self._sheet_again = again and self.transmissive and self.thin
-        known = not (self.thin or self.has_film or isinstance(self.ior, BaseTexture))
+        known = not (self.thin or isinstance(self.ior, BaseTexture))
         self._clear_again = again and self.transmissive and known
         # tables are of one index; materials that need none are shaded together
         self._boundary = float(bent(self.ior)[0]) if self._clear_again else None
@@ -151,7 +152,7 @@ class Principled(Microfacets):
     def albedo(self, wo: Floats) -> Floats:
         """Return about the albedo of all lobes, layered as in `evaluate`."""
         low, high, _, _ = gloss_tables()
-        at_f0, at_f90 = (lookup(table, self.mean_roughness(), wo[2]) for table in (low, high))
+        at_f0, at_f90 = (lookup(table, self.roughness_toward(wo), wo[2]) for table in (low, high))
         gloss = self._dielectric(np.zeros(1, f4)) * at_f0 + self.specular_weight * at_f90
         metal = self.base_color * at_f0 + at_f90
         if self._metal_again:
@@ -208,7 +209,7 @@ class Principled(Microfacets):
         if self.transmissive:
             cos = np.maximum(dot(wo, m), f4(0))
             reflected, cos_refracted = self._fresnel(cos)
-            crosses = (u[2] >= gloss + glass * _chance(reflected)) & (u[2] < facet)
+            crosses = (u[2] >= gloss + glass * mean_of_channels(reflected)) & (u[2] < facet)
             index = self._eta()
             wi = np.where(crosses, self._across(wo, wi, m, cos, cos_refracted, index), wi)
             if self._clear_again:
@@ -238,7 +239,7 @@ class Principled(Microfacets):
         clear = (f4(1) - self.metallic) * self.transmission
         reflected, _ = self._fresnel(cos)
         through, through_density = self._through(wo, wi, facets)
-        pdf = pdf + chances.glass * (density * _chance(reflected) + through_density)
+        pdf = pdf + chances.glass * (density * mean_of_channels(reflected) + through_density)
         if self._sheet_again or self._clear_again:
             grown = gain(self, wo, wi, None, both)
             value, through = value * grown, through * grown if self.thin else through
@@ -261,7 +262,9 @@ class Principled(Microfacets):
 
     def _gloss(self, cos: Floats) -> Floats:
         """Reflectance of the opaque dielectric, (3, n)."""
-        return self._gloss_with_film(cos) if self.has_film else self._dielectric(_fifth(cos))
+        if self.has_film:
+            return self._gloss_with_film(cos, self.specular_color)
+        return self._dielectric(_fifth(cos))
 
     def _matte(self, wo: Floats, wi: Floats, part: Floats) -> Floats:
         """Value of the diffuse base (3, n) that is a part (n,) of the surface."""
@@ -294,7 +297,7 @@ class Principled(Microfacets):
         else:
             value, density, cos, _ = facets.refraction_lobe(wo, wi, self._eta())
         reflected, _ = self._fresnel(cos)
-        return value * (f4(1) - reflected), density * (f4(1) - _chance(reflected))
+        return value * (f4(1) - reflected), density * (f4(1) - mean_of_channels(reflected))
 
     def _across(
         self, wo: Floats, wi: Floats, m: Floats, cos: Floats, cos_refracted: Floats, eta: Floats
@@ -324,9 +327,9 @@ class Principled(Microfacets):
         index = (f4(1) + root) / (f4(1) - root)
         return film_reflectance(cos, self.film_thickness, self.film_ior, f4(1), index)
 
-    def _gloss_with_film(self, cos: Floats) -> Floats:
+    def _gloss_with_film(self, cos: Floats, tint: Floats) -> Floats:
         f0 = ((self.ior - f4(1)) / (self.ior + f4(1))) ** 2
-        return self._film(cos, np.minimum(self.specular_color * f0, f4(1))) * self.specular_weight
+        return self._film(cos, np.minimum(tint * f0, f4(1))) * self.specular_weight
 
     def _eta(self) -> Floats:
         """Index beyond / before, (n,) or (1,); 1 for a sheet, and never quite 1 otherwise."""
@@ -336,23 +339,35 @@ class Principled(Microfacets):
         return index if self.back_facing is None else np.where(self.back_facing, f4(1) / index, index)
 
     def _under_gloss(self, wo: Floats, wi: Floats) -> Floats:
-        """Part of the light that reaches the diffuse base and leaves it again, (n,).
+        """Part of the light that reaches the diffuse base and leaves it again, (n,), or (3, n) below a film.
 
         Source: C. Kulla and A. Conty 2017, "Revisiting Physically Based Shading at Imageworks":
         (1 − E(wo))·(1 − E(wi))/(1 − mean E), with E the albedo of the gloss.
         """
+        one, other = (self._passed(self.roughness_toward(w), np.abs(w[2])) for w in (wo, wi))
+        cos = wo[2] if self.roughness_v is None else np.ones(1, f4)  # it has no influence
+        mean = [self._mean_passed(roughness, cos) for roughness in self.roughnesses_around()]
+        return one * other / np.maximum(sum(mean[1:], mean[0]) / f4(len(mean)), f4(1e-3))
+
+    def _passed(self, roughness: Floats, cos: Floats) -> Floats:
+        """Part of the light from cosines that the gloss does not reflect, (n,), or (3, n) below a film."""
+        a, b, _, _ = gloss_tables()
+        f0, f90 = self._dielectric(np.zeros(1, f4)).max(0), self.specular_weight
+        at_f0, at_f90 = (lookup(table, roughness, cos) for table in (a, b))
+        passed = f4(1) - f0 * at_f0 - f90 * at_f90
+        if not self.has_film:
+            return passed
+        facet = lookup(facet_cosines(), roughness, cos)
+        plain = self._dielectric(_fifth(facet)).max(0)
+        return passed - (at_f0 + at_f90) * (self._gloss_with_film(facet, self.specular_color.max(0)) - plain)
+
+    def _mean_passed(self, roughness: Floats, cos: Floats) -> Floats:
+        """Return the mean of `_passed` for diffuse light, at any `cos`."""
         if self.has_film:
-            passed = [f4(1) - self._gloss_with_film(np.abs(w[2])).max(0) for w in (wo, wi)]
-            return passed[0] * passed[1]
-        a, b, mean_a, mean_b = gloss_tables()
-        f0 = self._dielectric(np.zeros(1, f4)).max(0)
-        f90 = self.specular_weight
-        roughness = self.mean_roughness()
-        passed = [
-            f4(1) - f0 * lookup(first, roughness, cos) - f90 * lookup(second, roughness, cos)
-            for first, second, cos in ((a, b, wo[2]), (a, b, np.abs(wi[2])), (mean_a, mean_b, wo[2]))
-        ]
-        return passed[0] * passed[1] / np.maximum(passed[2], f4(1e-3))
+            return mean_over_cosines(partial(self._passed, roughness))
+        _, _, a, b = gloss_tables()
+        f0, f90 = self._dielectric(np.zeros(1, f4)).max(0), self.specular_weight
+        return f4(1) - f0 * lookup(a, roughness, cos) - f90 * lookup(b, roughness, cos)
 
     def _dielectric(self, weight: Floats) -> Floats:
         """Schlick's reflectance of the opaque dielectric, (3, n), at weight = (1 − cosθ)⁵."""
@@ -400,11 +415,6 @@ class Principled(Microfacets):
         if self._coated:
             coat = self.clearcoat * (floor + _schlick(COAT_F0, wo[2]))
         return Chances(gloss, glass, coat, again, diffuse)
-
-
-def _chance(reflected: Floats) -> Floats:
-    """Return the mean of a reflectance over the channels, if it has any, (n,)."""
-    return reflected if reflected.ndim == 1 else (reflected[0] + reflected[1] + reflected[2]) * f4(1 / 3)
 
 
 def _used(parameter: Any) -> bool:

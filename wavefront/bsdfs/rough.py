@@ -22,6 +22,8 @@ Distribution: TypeAlias = Literal["ggx", "beckmann"]
 Shadowing: TypeAlias = Literal["correlated", "separable"]
 
 
+AROUND = (f4(0.0669873), f4(0.5), f4(0.9330127))  # cos² of azimuths of 15°, 45° and 75°
+
 angle = partial(scalar, holds=np.isfinite, limit="finite")
 distribution_of = partial(one_of, choices=("ggx", "beckmann"))
 shadowing_of = partial(one_of, choices=("correlated", "separable"))
@@ -82,9 +84,20 @@ class Microfacets(JointBsdf):
         brushed = self.multiscatter and self.roughness_v is not None
         self.shape = Shape(known[0], known[1], beckmann, separable, brushed)
 
-    def mean_roughness(self) -> Floats:
-        """Return a roughness whose lobe has about the albedo of this one, with Fresnel's equations."""
-        return self.roughness if self.roughness_v is None else np.sqrt(self.roughness * self.roughness_v)
+    def roughness_toward(self, w: Floats) -> Floats:
+        """Return the roughness that masks directions w (3, n) as this surface does, (n,) or (1,)."""
+        if self.roughness_v is None:
+            return self.roughness
+        return self._roughness_at(self.facets().turn(w))
+
+    def roughnesses_around(self) -> list[Floats]:
+        """Return roughnesses whose mean is one over all azimuths (Gauss and Chebyshev)."""
+        return [self.roughness] if self.roughness_v is None else [self._roughness_at(t) for t in AROUND]
+
+    def _roughness_at(self, turn: Any) -> Floats:
+        """Return the roughness at a cos² of the azimuth."""
+        along, across = ((r * r) ** 2 for r in (self.roughness, self.roughness_v))
+        return np.sqrt(np.sqrt(across + (along - across) * turn))
 
     def facets(self) -> Facets:
         """Return the microfacets; unbound, their tangent is the x axis."""
