@@ -160,7 +160,9 @@ UNSUPPORTED = {
         nodes='<fractal3d name="f" type="color3"/>', base_color=link("base_color", "color3", "f")
     ),
     "M: base_color by a node that does not exist": document(base_color=link("base_color", "color3", "g")),
-    "M: transmission_dispersion_scale": document(transmission_dispersion_scale=0.5),
+    "M: OpenPBR: transmission_dispersion_scale": document(
+        transmission_dispersion_scale=0.5, transmission_weight=0.5
+    ),
     "M: OpenPBR: subsurface": document(subsurface_weight=0.5),
     "M: surfaceshader by disney_principled": document("disney_principled"),
     "the include of 'b.mtlx'": document(nodes='<xi:include href="b.mtlx" xmlns:xi="http://x"/>'),

@@ -44,6 +44,44 @@ def test_the_color_of_a_depth_is_that_of_the_interior():
     assert sheet.bsdf.transmission_color.ravel() == pytest.approx(color)
 
 
+@pytest.mark.parametrize("ior", [1.5, 1 / 1.5])
+def test_clear_glass_disperses_by_its_abbe_number(ior):
+    """V = (n(587.6 nm) − 1)/(n(486.1) − n(656.3)), and what it is divided by; one index with n = A + B/λ²."""
+    glass = wf.OpenPBR(
+        transmission_weight=1, specular_ior=ior, transmission_dispersion_scale=0.4,
+        transmission_dispersion_abbe_number=12, transmission_color=(0.9, 0.5, 0.2), specular_roughness=0,
+    ).bsdf  # fmt: skip
+    assert isinstance(glass, wf.Dielectric)
+    assert glass.dispersive
+    assert glass.specular
+    indices = glass.ior[:, 0] if ior > 1 else 1 / glass.ior[:, 0]
+    b, a = np.polyfit(1 / np.array([0.611, 0.549, 0.464]) ** 2, indices, 1)
+    at = {line: a + b / line**2 for line in (0.5876, 0.4861, 0.6563)}
+    assert at[0.5876] == pytest.approx(1.5, rel=1e-5)
+    assert (at[0.5876] - 1) / (at[0.4861] - at[0.6563]) == pytest.approx(12 / 0.4, rel=1e-3)
+    assert glass.transmittance.ravel() == pytest.approx([0.9, 0.5, 0.2])
+    for nothing in ({"transmission_weight": 0}, {"transmission_dispersion_abbe_number": 0}):
+        given = {"transmission_weight": 1, "transmission_dispersion_scale": 1, **nothing}
+        assert isinstance(wf.OpenPBR(**given).bsdf, OpenPBRBsdf)
+
+
+def test_what_does_not_disperse_is_said():
+    given = {"transmission_weight": 1, "transmission_dispersion_scale": 1}
+    image = wf.Texture([[0.1, 0.8]])
+    for more in (
+        {"transmission_weight": 0.5},
+        {"coat_weight": 0.1},
+        {"geometry_thin_walled": True},
+        {"specular_ior": image},
+        {"fuzz_weight": image},
+    ):
+        with pytest.warns(UserWarning, match="transmission_dispersion_scale is left out"):
+            assert isinstance(wf.OpenPBR(**{**given, **more}).bsdf, OpenPBRBsdf)
+    for name, wrong in (("scale", 1.5), ("abbe_number", -1)):
+        with pytest.raises(wf.SceneError, match=f"OpenPBR transmission_dispersion_{name}"):
+            wf.OpenPBR(**{f"transmission_dispersion_{name}": wrong})
+
+
 def test_emission_and_opacity():
     lamp = wf.OpenPBR(emission_luminance=3, emission_color=(1, 0.5, 0.2), geometry_opacity=0.4)
     assert lamp.emission.ravel() == pytest.approx([3, 1.5, 0.6])

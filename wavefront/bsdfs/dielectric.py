@@ -8,7 +8,7 @@ from typing import Self
 import numpy as np
 
 from ..arrays.state import SurfaceInteraction
-from ..arrays.vec import BELOW_ONE, Floats, broadcast, dot, f4
+from ..arrays.vec import BELOW_ONE, Doubles, Floats, broadcast, dot, f4
 from ..core.errors import one_of
 from ..core.parameter import Parameter, parametrized
 from ..core.suggestions import suggests_keywords
@@ -49,6 +49,15 @@ INDICES = {
     "sf11": 1.78472,
     "water": 1.333,
 }
+
+
+def dispersed(index: float, abbe: float) -> Doubles:
+    """Return the indices (3,) of an index at 587.6 nm and an Abbe number, at 611, 549 and 464 nm.
+
+    By Cauchy's equation, with the lines C and F at 656.3 and 486.1 nm.
+    """
+    steep = (index - 1) / abbe / (1 / 0.4861**2 - 1 / 0.6563**2)
+    return np.array([index + steep * (1 / at**2 - 1 / 0.5876**2) for at in (0.611, 0.549, 0.464)])
 
 
 @parametrized

@@ -35,14 +35,12 @@ NORMALS = ("normalmap", "gltf_normalmap")
 IMAGES = ("image", "tiledimage", "gltf_image", "gltf_colorimage")
 # inputs of OpenPBR that `wf.OpenPBR` does not have
 UNSUPPORTED = (
-    "transmission_dispersion_scale",
     "coat_roughness_anisotropy",
     "geometry_coat_normal",
     "geometry_tangent",
     "geometry_coat_tangent",
 )
 WITHOUT_EFFECT = (
-    "transmission_dispersion_abbe_number",
     "subsurface_radius",
     "subsurface_radius_scale",
     "subsurface_scatter_anisotropy",

@@ -8,6 +8,8 @@ from numpy.typing import ArrayLike
 from ..arrays.elementary import log
 from ..arrays.state import SurfaceInteraction
 from ..arrays.vec import Floats, f4
+from ..bsdfs import Bsdf, Dielectric
+from ..bsdfs.dielectric import dispersed
 from ..bsdfs.openpbr import OpenPBRBsdf
 from ..colors import rgb
 from ..core.errors import SceneError, number, warn_caller
@@ -18,6 +20,14 @@ from ..textures.normal_map import BaseNormalMap
 from ..textures.parameter import Color, Scalar, color
 from .material import Material
 
+BESIDE_GLASS = (
+    "base_metalness",
+    "coat_weight",
+    "fuzz_weight",
+    "thin_film_weight",
+    "geometry_thin_walled",
+    "specular_roughness_anisotropy",
+)
 LEAST_COLOR = f4(1e-4)  # of what passes `transmission_depth`
 
 
@@ -40,6 +50,10 @@ class OpenPBR(Material):
         depth is more than 0, on a path of this length inside.
     transmission_scatter, transmission_scatter_anisotropy
         Scattering inside, 1/`transmission_depth`, and its mean cosine in (−1, 1).
+    transmission_dispersion_scale, transmission_dispersion_abbe_number
+        The Abbe number, at least 0, is divided by the scale in [0, 1], and gives each channel an index; there
+        is no dispersion where one of them is 0. It makes the `bsdf` a `Dielectric`, beside which there can be
+        nothing else.
     subsurface_weight, subsurface_color
         Part of the base that scatters light below the surface, as if it were diffuse.
     coat_weight, coat_color, coat_roughness, coat_ior, coat_darkening
@@ -89,6 +103,8 @@ class OpenPBR(Material):
         transmission_depth: float = 0.0,
         transmission_scatter: ArrayLike = 0.0,
         transmission_scatter_anisotropy: float = 0.0,
+        transmission_dispersion_scale: float = 0.0,
+        transmission_dispersion_abbe_number: float = 20.0,
         subsurface_weight: Scalar = 0.0,
         subsurface_color: Color = 0.8,
         coat_weight: Scalar = 0.0,
@@ -120,8 +136,9 @@ class OpenPBR(Material):
             )
         if isinstance(subsurface_weight, BaseTexture) or subsurface_weight > 0:
             warn_caller("OpenPBR: subsurface scattering is approximated by a diffuse surface of its color")
+        layers = OpenPBRBsdf(**{key: given[key] for key in OpenPBRBsdf.defaults if key in given})
         super().__init__(
-            OpenPBRBsdf(**{key: given[key] for key in OpenPBRBsdf.defaults if key in given}),
+            _dispersive(layers, transmission_dispersion_scale, transmission_dispersion_abbe_number),
             alpha=geometry_opacity
             if isinstance(geometry_opacity, BaseTexture) or geometry_opacity != 1
             else None,
@@ -135,6 +152,27 @@ class OpenPBR(Material):
 
 def _amount(name: str, value: float) -> float:
     return number(f"OpenPBR {name}", value, lambda x: 0 <= x < np.inf, "at least 0 and finite")
+
+
+def _dispersive(layers: OpenPBRBsdf, scale: float, abbe: float) -> Bsdf:
+    """Return glass with an index for each channel, where there is nothing else, or the layers as they are."""
+    scale = number("OpenPBR transmission_dispersion_scale", scale, lambda x: 0 <= x <= 1, "in [0, 1]")
+    abbe = _amount("transmission_dispersion_abbe_number", abbe)
+    if scale == 0 or abbe == 0 or not layers.transmissive:
+        return layers
+    index, clear = layers.index_inside, layers.transmission_weight
+    beside = (getattr(layers, key) for key in BESIDE_GLASS)
+    mixed = any(isinstance(part, BaseTexture) or np.any(part) for part in beside)
+    if mixed or isinstance(index, BaseTexture) or isinstance(clear, BaseTexture) or clear != 1:
+        warn_caller("OpenPBR: transmission_dispersion_scale is left out where there is more than clear glass")
+        return layers
+    ior = float(index[0])
+    return Dielectric(
+        dispersed(ior, abbe / scale) if ior >= 1 else 1 / dispersed(1 / ior, abbe / scale),
+        layers.specular_roughness,
+        reflectance=layers.specular_color,
+        transmittance=layers.transmission_color,
+    )
 
 
 def _emission(luminance: float, tint: Color) -> Color | None:

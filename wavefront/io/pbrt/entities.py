@@ -9,6 +9,7 @@ from typing import Any, TypeVar
 import numpy as np
 
 from ...arrays.vec import Doubles, luminance
+from ...bsdfs.dielectric import dispersed
 from ...colors.spectrum import blackbody, spectrum_rgb
 from ...core.errors import SceneError, in_brief
 from ...core.suggestions import did_you_mean
@@ -23,16 +24,8 @@ NEUTRAL = ("stdillum-D65", "illum-acesD60")
 GLASSES = {"BK7": (1.5168, 64.2), "BAF10": (1.67, 47.1), "FK51A": (1.4866, 84.5), "LASF9": (1.8503, 32.2)}
 GLASSES |= {"F5": (1.6727, 32.2), "F10": (1.7283, 28.4), "F11": (1.7847, 25.8)}
 BRASS = ((0.444, 0.527, 1.094), (3.695, 2.765, 1.829))  # CuZn, at 650, 550 and 450 nm
-
-
-def _dispersed(index: float, abbe: float) -> Doubles:
-    """Return the indices (3,) at 611, 549 and 464 nm by Cauchy's equation."""
-    steep = (index - 1) / abbe / (1 / 0.4861**2 - 1 / 0.6563**2)
-    return np.array([index + steep * (1 / at**2 - 1 / 0.5876**2) for at in (0.611, 0.549, 0.464)])
-
-
 # spectra of indices as RGB
-NAMED = {f"glass-{name}": _dispersed(*given) for name, given in GLASSES.items()}
+NAMED = {f"glass-{name}": dispersed(*given) for name, given in GLASSES.items()}
 for _name, _both in (METALS | {"CuZn": BRASS}).items():
     NAMED |= {f"metal-{_name}-eta": np.array(_both[0]), f"metal-{_name}-k": np.array(_both[1])}
 Converter = Callable[["Entity", "Job"], Any]
