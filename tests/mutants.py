@@ -22,6 +22,7 @@ from __future__ import annotations
 import argparse
 import ast
 import contextlib
+import functools
 import os
 import signal
 import sys
@@ -35,7 +36,10 @@ from typing import Any
 import numpy as np
 import pytest
 
+from wavefront.core.parameter import Parameter
+
 ROOT = Path(__file__).resolve().parent.parent
+OURS = str(ROOT / "wavefront"), str(ROOT / "tests")
 # the tests that concern a file, quick ones first
 TESTS: dict[str, tuple[str, ...]] = {
     "wavefront/stages/reuse.py": (
@@ -81,20 +85,15 @@ TESTS: dict[str, tuple[str, ...]] = {
             "tests/properties/test_density_of_bsdfs.py",
         ),
     ),
-    "wavefront/bsdfs/diffuse_transmission.py": (
-        "tests/bsdfs/test_bsdfs.py",
-        "tests/bsdfs/test_bsdf_models.py",
-        "tests/properties/test_density_of_bsdfs.py",
-    ),
     "wavefront/bsdfs/openpbr.py": (
         "tests/bsdfs/test_openpbr.py",
         "tests/bsdfs/test_bsdfs.py",
         "tests/bsdfs/test_bsdf_models.py",
         "tests/properties/test_density_of_bsdfs.py",
     ),
-    "wavefront/bsdfs/sheen.py": (
-        "tests/bsdfs/test_bsdf_formulas.py",
-        "tests/properties/test_density_of_bsdfs.py",
+    **dict.fromkeys(
+        ("wavefront/bsdfs/sheen.py", "wavefront/bsdfs/diffuse_transmission.py"),
+        ("tests/bsdfs/test_bsdf_formulas.py", "tests/properties/test_density_of_bsdfs.py"),
     ),
     "wavefront/bsdfs/measured.py": (
         "tests/bsdfs/test_measured.py",
@@ -382,10 +381,19 @@ def apply(mutant: Mutant) -> None:
             if new.__module__ != name:
                 continue
             _replace_code(old, new)
+        elif isinstance(old, functools.partial):
+            old.__setstate__(new.__reduce__()[2])
         elif isinstance(old, CONSTANTS):
             for other in list(sys.modules.values()):
                 if other is not None and getattr(other, "__dict__", {}).get(key) is old:
                     setattr(other, key, new)
+
+
+    for module in list(sys.modules.values()):  # what the unchanged tests have left in caches
+        if (getattr(module, "__file__", None) or "").startswith(OURS):
+            for value in list(vars(module).values()):
+                if hasattr(value, "cache_clear"):
+                    value.cache_clear()
 
 
 def _replace_code(old: Any, new: Any) -> None:
@@ -397,10 +405,10 @@ def _replace_code(old: Any, new: Any) -> None:
                     _replace_code(vars(old)[key], value)
                 elif isinstance(value, CONSTANTS) and not key.startswith("__"):
                     setattr(old, key, value)
+                elif isinstance(value, Parameter):
+                    vars(old)[key].convert = value.convert
         return
     function, changed = _function(old), _function(new)
-    if hasattr(old, "cache_clear"):
-        old.cache_clear()
     if isinstance(function, types.FunctionType) and isinstance(changed, types.FunctionType):
         function.__code__ = changed.__code__
         function.__defaults__, function.__kwdefaults__ = changed.__defaults__, changed.__kwdefaults__

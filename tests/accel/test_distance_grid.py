@@ -9,7 +9,7 @@ from rays import check_batches, nothing
 
 import wavefront as wf
 from wavefront.accel import Geometry
-from wavefront.accel.distance_grid import DistanceGridPrimitives
+from wavefront.accel.distance_grid import DistanceGridPrimitives, _first_root
 from wavefront.accel.numpy_accel import NumpyAccelerator
 from wavefront.arrays.state import Rays
 from wavefront.compile.scene import compile_scene
@@ -188,6 +188,95 @@ def test_points_normals_and_their_continuity() -> None:
         assert (surface.ns * direction).sum(0).min() > 0.99
         jumps.append(np.linalg.norm(np.diff(surface.ns, axis=1), axis=0).max())
     assert jumps[0] < 1e-3 < 1e-2 < jumps[1]
+
+
+def test_normals_are_those_of_the_cells_around_a_corner() -> None:
+    """Of ax² + bx for each axis, xy² and yz², whose slopes in a cell are known: that of x² is 2i + 1."""
+    rng = np.random.default_rng(4)
+    a, b, sizes = np.array([0.3, -0.2, 0.25]), np.array([-1.5, 1.2, -1.9]), np.array([6, 8, 9])
+    x, y, z = (np.arange(n) for n in sizes)
+    parts = [a[k] * at**2 + b[k] * at for k, at in enumerate((x, y, z))]
+    values = parts[0] + parts[1][:, None] + parts[2][:, None, None] + 2.1
+    across = 0.03, 0.02
+    values = values + across[0] * x * (y**2)[:, None] + across[1] * y[:, None] * (z**2)[:, None, None]
+    shape = wf.SignedDistanceGrid(values, SKEWED)
+    scene = compile_scene(wf.Scene(shape, [wf.Environment(1)]), NumpyAccelerator)
+    turn = SKEWED[:3, :3]
+    target = turn @ rng.random((3, 2000)) + SKEWED[:3, 3:]
+    origin = (target + 3 * rng.normal(size=(3, 2000))).astype(f4)
+    direction = ((target - origin) / np.linalg.norm(target - origin, axis=0)).astype(f4)
+    rays = Rays(origin - scene.center[:, None].astype(f4), direction, nothing(2000))
+    hits = intersect(scene, rays)
+    rays, hits = rays.take(hits.found), hits.take(hits.found)
+    surface = interaction(scene, rays, hits)
+    place = np.linalg.solve(turn, surface.point + scene.center[:, None] - SKEWED[:3, 3:])
+    place *= (sizes - 1)[:, None]
+    corner = np.rint(place)
+    second = place - corner + 0.5
+    squares = [np.interp(at, np.arange(n), np.arange(n) ** 2) for at, n in zip(place, sizes, strict=True)]
+    total = 0
+    for sides in np.ndindex(2, 2, 2):
+        cell = np.clip(corner + np.reshape(sides, (3, 1)) - 1, 0, (sizes - 2)[:, None])
+        slope = a[:, None] * (2 * cell + 1) + b[:, None]
+        slope[0] += across[0] * squares[1]
+        slope[1] += across[0] * place[0] * (2 * cell[1] + 1) + across[1] * squares[2]
+        slope[2] += across[1] * place[1] * (2 * cell[2] + 1)
+        slope *= (sizes - 1)[:, None]
+        weight = np.prod([w if side else 1 - w for side, w in zip(sides, second, strict=True)], 0)
+        total = total + weight * slope / np.linalg.norm(slope, axis=0)
+    normal = np.linalg.solve(turn.T, total)
+    normal *= np.where(surface.back_facing, -1, 1) / np.linalg.norm(normal, axis=0)
+    inside = (normal * surface.ng).sum(0) > 0.01
+    inside &= (normal * surface.wo).sum(0) > 0.01
+    inside &= (np.abs(second) > 1e-3).all(0) & (np.abs(second - 1) > 1e-3).all(0)  # both corners are nearest
+    assert inside.sum() > 300
+    np.testing.assert_allclose(surface.ns[:, inside], normal[:, inside], atol=2e-4)
+
+
+def test_the_first_change_of_sign_of_a_cubic_is_found() -> None:
+    """Beside the roots by eigenvalues, of cubics by their Bernstein coefficients."""
+    b = np.random.default_rng(0).normal(size=(4, 3000))
+    power = np.stack(
+        [b[0], 3 * (b[1] - b[0]), 3 * (b[2] - 2 * b[1] + b[0]), b[3] - 3 * b[2] + 3 * b[1] - b[0]]
+    )
+    due = np.full(3000, np.inf)
+    for k in range(3000):
+        roots = np.roots(power[::-1, k])
+        real = roots[np.abs(roots.imag) < 1e-9].real
+        due[k] = min(real[(real > 0) & (real < 1)], default=np.inf)
+    with np.errstate(all="ignore"):
+        found = _first_root(b, b[0] >= 0)
+    assert np.isfinite(due).sum() > 1000
+    np.testing.assert_allclose(found, due, atol=1e-9)
+
+
+def test_grids_of_several_sizes_in_one_scene() -> None:
+    """Rays meet the nearest of them, as if each were alone, and have its normals."""
+    rng, n = np.random.default_rng(2), 500
+    shapes = [
+        wf.SignedDistanceGrid(sphere(9), BOX),
+        wf.SignedDistanceGrid(torus(12), BOX, smooth=False).translated((1, 0.5, 0)),
+    ]
+    origin = rng.normal(size=(3, n)) * 4
+    direction = rng.uniform(-1, 1, (3, n)) - origin
+    rays = Rays(origin.astype(f4), (direction / np.linalg.norm(direction, axis=0)).astype(f4), nothing(n))
+
+    def seen(some: list) -> tuple[np.ndarray, np.ndarray]:
+        scene = compile_scene(wf.Scene(some, [wf.Environment(1)]), NumpyAccelerator)
+        moved = Rays(rays.origin - scene.center[:, None].astype(f4), rays.direction, rays.exclude_prim)
+        hits = intersect(scene, moved)
+        met = hits.found
+        normal = np.zeros((3, n))
+        normal[:, met] = interaction(scene, moved.take(met), hits.take(met)).ns
+        return hits.t, normal
+
+    t, normal = seen(shapes)
+    alone = [seen([shape]) for shape in shapes]
+    first = np.argmin([each[0] for each in alone], 0)
+    np.testing.assert_allclose(t, np.choose(first, [each[0] for each in alone]), rtol=1e-5)
+    due = np.where(first, alone[1][1], alone[0][1])
+    assert (np.abs(normal - due).max(0) < 1e-2).mean() > 0.99  # not where rays graze
+    assert 50 < first.sum() < n - 50
 
 
 # --- the shape ------------------------------------------------------------------------------------

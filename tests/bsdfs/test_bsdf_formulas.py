@@ -13,6 +13,7 @@ from wavefront.bsdfs import (
     Conductor,
     Dielectric,
     Diffuse,
+    DiffuseTransmission,
     Mirror,
     Mix,
     OrenNayar,
@@ -266,13 +267,33 @@ def test_the_tangent_follows_the_coordinates_and_turns_towards_v():
     n = np.array([[0.0, 0.0], [0, 0], [1, -1]], F4)
     lane, zero = np.zeros(2, np.intp), np.zeros(2, F4)
     at = SurfaceInteraction(n, zero, n, n, n, lane, lane, zero > 0)
-    for sign in (1, -1):
-        at.tangent_frame = np.repeat(F4([[0], [2], [0.1], [-3 * sign], [0], [0]]), 2, 1)
+    for sign, size in ((1, 1), (-1, 1), (1, 0.1), (-1, 0.1)):  # of coordinates, which may be any
+        frame = F4([[0], [2], [0.1], [-3 * sign], [0], [0]])
+        at.tangent_frame = np.repeat(F4(size) * frame, 2, 1)
         cos, sin = Tangent(np.array([30.0], F4)).at(at)
         back = at.frame().to_world(np.stack([cos, sin, zero]))
         turn = np.radians(30)
         expected = [-sign * np.sin(turn), np.cos(turn), 0]
         assert back == pytest.approx(np.repeat(np.reshape(expected, (3, 1)), 2, 1), abs=1e-6)
+
+
+def test_a_sheet_that_scatters_to_both_sides():
+    """M. Pharr et al. 2023, section 9.2: ρ/π and τ/π; samples by the brightest channels of both."""
+    (wo, wi), (_, below) = pairs(), pairs(below=True)
+    sheet = DiffuseTransmission(COLOR, (0.1, 0.2, 0.3))
+    assert sheet.f(wo, wi) == pytest.approx(np.tile(column(COLOR) / np.pi, wi.shape[1]), rel=1e-6)
+    assert sheet.f(wo, below) == pytest.approx(
+        np.tile(column((0.1, 0.2, 0.3)) / np.pi, wi.shape[1]), rel=1e-6
+    )
+    assert sheet.pdf(wo, wi) == pytest.approx(0.75 * wi[2] / np.pi, rel=1e-6)
+    assert sheet.pdf(wo, below) == pytest.approx(-0.25 * below[2] / np.pi, rel=1e-6)
+    assert DiffuseTransmission().albedo(wo)[:, 0] == pytest.approx([0.5] * 3)
+    assert DiffuseTransmission().f(wo, below)[0, 0] == pytest.approx(0.25 / np.pi)
+    assert (DiffuseTransmission(0.9, 0.8).albedo(wo) == 1).all()
+
+
+def test_brushes_run_along_u_unless_turned():
+    assert Conductor(1, 1, 0.5, roughness_v=0.2).rotation == 0
 
 
 @pytest.mark.parametrize("ior", [1.3, 1.5, 2.2, 0.8, 0.1])
@@ -762,6 +783,22 @@ def test_density_of_refraction(eta, alpha):
     sound = valid & (np.abs(wo + eta * wi)[2] > 0.05)
     assert sound.sum() > 150
     assert pdf[sound] == pytest.approx(exact[sound], rel=3e-3, abs=1e-5)
+
+
+@pytest.mark.parametrize("beckmann", [False, True])
+def test_nothing_is_refracted_where_no_facet_does_it(beckmann):
+    wo, wi = pairs(below=True)
+    value, pdf, _, valid = Facets(F4(0.5), beckmann=beckmann).refraction_lobe(wo, wi, F4(1.5))
+    assert 100 < valid.sum() < valid.size - 100
+    assert (value[valid] > 0).any()
+    assert not value[~valid].any()
+    assert not pdf[~valid].any()
+
+
+def test_facets_of_some_points():
+    facets = Facets(F4([0.1, 0.2]), F4([0.3, 0.4]), F4([[1, 0], [0, 1]])).take(np.array([1]))
+    assert (facets.alpha, facets.alpha_v) == (F4([0.2]), F4([0.4]))
+    assert facets.tangent.tolist() == [[0], [1]]
 
 
 @pytest.mark.parametrize("alpha", [0.1, 0.5, 1.0])

@@ -92,6 +92,37 @@ def test_values_of_merl_are_linear_between_cells() -> None:
     np.testing.assert_allclose(f[:, inside], due[:, inside], rtol=5e-3)
 
 
+def test_cells_of_merl_have_their_values_at_their_centers() -> None:
+    """Values that grow with the numbers of cells do so in between: θh by its root, θd and φd evenly."""
+    numbers = np.meshgrid(np.arange(90), np.arange(90), np.arange(180), indexing="ij")
+    table = 100 + numbers[0] + 0.5 * numbers[1] + 0.25 * numbers[2]
+    bsdf = Measured.from_bytes("steps.binary", merl_bytes()[:12] + np.stack([table] * 3).tobytes())
+    wo, wi = directions(4000).astype(float), directions(4000).astype(float)
+    half = wo + wi
+    half /= np.linalg.norm(half, axis=0)
+    turn = np.arctan2(half[1], half[0])
+    cos, sin, level = np.cos(turn), np.sin(turn), np.hypot(half[0], half[1])
+    x = (cos * wi[0] + sin * wi[1]) * half[2] - wi[2] * level
+    y = cos * wi[1] - sin * wi[0]
+    tilt = np.arccos(half[2]) / (np.pi / 2)
+    up = np.arccos(np.minimum((wi * half).sum(0), 1)) / (np.pi / 2)
+    cells = 90 * np.sqrt(tilt) - 0.5, 90 * up - 0.5, np.arctan2(y, x) % np.pi / np.pi * 180 - 0.5
+    due = (100 + cells[0] + 0.5 * cells[1] + 0.25 * cells[2]) * np.array([[1], [1.15], [1.66]]) / 1500
+    inside = (cells[0] > 0) & (cells[0] < 89) & (cells[1] > 0.5) & (cells[2] > 0) & (cells[2] < 179)
+    assert inside.sum() > 3000
+    f = bsdf.f(wo.astype(F4), wi.astype(F4))
+    np.testing.assert_allclose(f[:, inside], due[:, inside], rtol=1e-5)  # 0.001 of a cell
+
+
+def test_samples_of_merl_have_little_noise() -> None:
+    """Densities by the table's own values, for views between and beside the tabulated ones."""
+    u = np.random.default_rng(0).random((2, 10_000), dtype=F4)
+    for angle in np.radians([0, 20, 50, 75, 85]):
+        wo = np.repeat(F4([[np.sin(angle)], [0], [np.cos(angle)]]), u.shape[1], 1)
+        weight = measured("merl").sample_f(wo, u).weight.mean(0, dtype=float)
+        assert weight.std() < 0.25 * weight.mean()
+
+
 def test_merl_is_scaled_by_channel_and_black_where_nothing_was_measured() -> None:
     table = np.full((3, 90, 90, 180), 100.0)
     table[:, 0] = -1
@@ -138,12 +169,22 @@ def test_spectra_are_colors_under_d65() -> None:
 def test_azimuths_that_are_left_out_are_mirrored(kind: str) -> None:
     """Of azimuths from −180° to 0° or to −90°, which are those of the file with all of them."""
     bsdf, wo, wi = measured(kind), directions(500), directions(500)
+    assert bsdf.rotation == 0
     wo[:2] = -np.abs(wo[:2])
     for part, whole in zip(bsdf.evaluate(wo, wi), measured("1").evaluate(wo, wi), strict=True):
         np.testing.assert_allclose(part, whole, rtol=1e-4, atol=1e-5)
     for signs in ((-1, -1, 1), (-1, 1, 1), (1, -1, 1))[: 1 if kind == "2" else 3]:
         flip = np.array(signs, F4)[:, None]
         np.testing.assert_allclose(bsdf.f(wo * flip, wi * flip), bsdf.f(wo, wi), rtol=1e-4, atol=1e-5)
+
+
+@pytest.mark.parametrize("kind", ["1", "2", "4"])
+def test_views_along_the_axes_of_tables_are_those_beside_them(kind: str) -> None:
+    """Where azimuths begin and end, and others are mirrored."""
+    bsdf, wi = measured(kind), directions(200)
+    for x, y in ((0.6, 0.0), (-0.6, 0.0), (0.0, 0.6), (0.0, -0.6)):
+        on, beside = (np.repeat(F4([[x - off], [y + off], [0.8]]), 200, 1) for off in (0, 1e-6))
+        np.testing.assert_allclose(bsdf.f(on, wi), bsdf.f(beside, wi), rtol=2e-3, atol=1e-4)
 
 
 def test_nothing_that_merl_has_is_left_out_by_its_samples() -> None:

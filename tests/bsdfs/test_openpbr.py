@@ -10,6 +10,7 @@ from wavefront.bsdfs.fresnel import fresnel_conductor, fresnel_dielectric
 from wavefront.bsdfs.fuzz import fuzz_albedo, fuzz_lobe
 from wavefront.bsdfs.openpbr import weighted_index
 from wavefront.bsdfs.thin_film import film_reflectance
+from wavefront.core.errors import SceneError
 
 F4 = np.float32
 ANGLES = np.radians([0, 30, 60, 80])
@@ -48,8 +49,9 @@ def test_a_metal_is_tinted_at_82_degrees():
         lobe = OpenPBRBsdf(**{**metal, "base_color": 1.0}).f(*pair(z, z))
         schlick = f0 + (1 - f0) * (1 - z) ** 5
         assert plain.f(*pair(z, z)) / lobe == pytest.approx(schlick, rel=1e-5)
-    dim = OpenPBRBsdf(**metal, specular_weight=0.3)
-    assert dim.f(wo, wi) == pytest.approx(0.3 * plain.f(wo, wi), rel=1e-5)
+    for weight, part in ((0.3, 0.3), (2.0, 1.0)):  # more than all is all
+        weighted = OpenPBRBsdf(**metal, specular_weight=weight)
+        assert weighted.f(wo, wi) == pytest.approx(part * plain.f(wo, wi), rel=1e-5)
 
 
 def test_the_weight_scales_the_reflectance_along_the_normal():
@@ -59,6 +61,8 @@ def test_the_weight_scales_the_reflectance_along_the_normal():
             expected = weight * ((ior - 1) / (ior + 1)) ** 2
             assert ((bent - 1) / (bent + 1)) ** 2 == pytest.approx(expected, rel=1e-4, abs=1e-9)
             assert (bent >= 1) == (ior >= 1 or weight == 0)
+    for ior, most in ((1.5, 1999), (1 / 1.5, 1 / 1999)):  # of reflectances as near to 1 as float32 resolves
+        assert weighted_index(np.full(1, ior, F4), np.full(1, 1e6, F4)) == pytest.approx(most, rel=1e-3)
 
 
 def test_the_diffuse_base_is_eon():
@@ -132,9 +136,20 @@ def test_light_that_crosses_passes_a_coat_once():
 
 
 def test_the_thickness_of_a_film_is_in_micrometers():
-    layers = OpenPBRBsdf(thin_film_weight=1.0, thin_film_thickness=0.4, base_color=0.5)._layers
-    film = film_reflectance(F4([0.7]), F4([400]), F4([1.4]), F4(1), F4([1.5]))
-    assert layers._gloss(F4([0.7])) == pytest.approx(film, rel=1e-3)
+    """The base below gets and returns what the film lets pass, as in `Principled`; the mean is over cosines."""
+    given = {"thin_film_weight": 1.0, "thin_film_thickness": 0.4, "specular_ior": 1.8}
+    given["specular_roughness"] = 0.1  # so that facets reflect as the surface does
+
+    def film(z):
+        return film_reflectance(F4(z), F4([400]), F4([1.4]), F4(1), F4([1.8]))
+
+    layers = OpenPBRBsdf(**given, base_color=0.5)._layers
+    assert layers._gloss(F4([0.7])) == pytest.approx(film([0.7]), rel=1e-3)
+    wo, wi = pair(0.7, 0.4, 0.3)
+    white, black = (OpenPBRBsdf(**given, base_color=color).f(wo, wi) for color in (1.0, 0.0))
+    z = (np.arange(1000) + 0.5) / 1000
+    mean = 2 * ((1 - film(z)) * z).mean(1, keepdims=True)
+    assert white - black == pytest.approx((1 - film([0.7])) * (1 - film([0.4])) / mean / np.pi, rel=0.01)
 
 
 @pytest.mark.parametrize("edge", [0.0, 0.4, 1.0])
@@ -152,13 +167,42 @@ def test_a_metal_below_a_film_has_an_index(edge):
     assert layers._metal(cos) == pytest.approx(film, rel=1e-3)
 
 
-def test_a_coat_reflects_by_its_index():
+@pytest.mark.parametrize(("metal", "clear"), [(0.0, 0.0), (0.3, 0.4), (1.0, 0.0)])
+@pytest.mark.parametrize("roughness", [0.2, 0.9])
+def test_darkening_by_a_coat(metal: float, clear: float, roughness: float):
+    """Δ = (1 − K)/(1 − E·K): K is between the means of F outside and inside by how diffuse the base is."""
+    f0, coat = 0.6, 1.7
+    wo, wi = pair(0.8, 0.5, 0.3)
+    dark, bright = (
+        OpenPBRBsdf(
+            base_color=f0,
+            base_metalness=metal,
+            transmission_weight=clear,
+            specular_roughness=roughness,
+            coat_weight=1.0,
+            coat_ior=coat,
+            coat_darkening=darkening,
+            multiscatter=False,
+        ).f(wo, wi)
+        for darkening in (1.0, 0.0)
+    )
+    outside, below = mean_fresnel(coat), mean_fresnel(coat / 1.5)
+    inside = 1 - (1 - outside) / coat**2
+    gloss = below + (1 - below) * metal
+    back = outside + (inside - outside) * (1 - gloss + roughness * gloss)
+    base = (1 - clear) * (f0 + (1 - f0) * below) + clear
+    albedo = (1 - metal) * base + metal * (f0 + (1 - f0) / 21)  # Schlick's mean
+    assert dark / bright == pytest.approx(np.full((3, 1), (1 - back) / (1 - albedo * back)), rel=2e-3)
+
+
+@pytest.mark.parametrize("ior", [1.2, 1.8])
+def test_a_coat_reflects_by_its_index(ior: float):
     wo, wi = pair(0.7, 0.7)
     bare = {"base_color": 0.0, "specular_weight": 0.0, "coat_roughness": 0.3, "coat_weight": 0.5}
     metal = {"base_metalness": 1.0, "base_color": 1.0, "specular_roughness": 0.3, "multiscatter": False}
     lobe = OpenPBRBsdf(**metal).f(wo, wi) / (1 + 0 * wo)
-    reflected = fresnel_dielectric(F4([0.7]), F4([1.8]))[0]
-    assert OpenPBRBsdf(**bare, coat_ior=1.8).f(wo, wi) == pytest.approx(0.5 * reflected * lobe, rel=1e-4)
+    reflected = fresnel_dielectric(F4([0.7]), F4([ior]))[0]
+    assert OpenPBRBsdf(**bare, coat_ior=ior).f(wo, wi) == pytest.approx(0.5 * reflected * lobe, rel=1e-4)
 
 
 def test_the_gloss_below_a_coat_is_relative_to_its_index():
@@ -217,6 +261,49 @@ def test_a_clear_part_reflects_its_color_outside_alone(thin):
             OpenPBRBsdf(**given, specular_color=c).bind(surface(wo, inside)).f(wo, down) for c in (1.0, tint)
         )
         assert tinted == pytest.approx(plain, rel=1e-5)
+
+
+def test_light_that_crosses_is_that_of_the_clear_part():
+    wo, wi = pair(0.8, -0.6, 3)
+    whole, half = (
+        OpenPBRBsdf(base_color=1.0, transmission_weight=w, specular_roughness=0.5, multiscatter=False).f(
+            wo, wi
+        )
+        for w in (1.0, 0.5)
+    )
+    assert (whole > 0).all()
+    assert half == pytest.approx(0.5 * whole, rel=1e-5)
+
+
+def test_defaults_are_those_of_the_specification():
+    specified = {
+        "base_weight": 1, "base_color": 0.8, "base_metalness": 0, "base_diffuse_roughness": 0,
+        "specular_weight": 1, "specular_color": 1, "specular_roughness": 0.3, "specular_ior": 1.5,
+        "specular_roughness_anisotropy": 0, "transmission_weight": 0, "transmission_color": 1,
+        "subsurface_weight": 0, "subsurface_color": 0.8, "coat_weight": 0, "coat_color": 1,
+        "coat_roughness": 0, "coat_ior": 1.6, "coat_darkening": 1, "fuzz_weight": 0, "fuzz_color": 1,
+        "fuzz_roughness": 0.5, "thin_film_weight": 0, "thin_film_thickness": 0.5, "thin_film_ior": 1.4,
+    }  # fmt: skip
+    found = vars(OpenPBRBsdf())
+    assert {name: float(F4(value)) for name, value in specified.items()} == {
+        name: float(found[name].max()) for name in specified
+    }
+
+
+@pytest.mark.parametrize(
+    ("name", "allowed", "refused"),
+    [
+        ("specular_weight", 0, -0.01),
+        ("coat_ior", 1, 0.99),
+        ("coat_ior", 1e6, 1.01e6),
+        ("thin_film_thickness", 0, -0.01),
+        ("thin_film_thickness", 100, 100.5),
+    ],
+)
+def test_parameters_out_of_range_are_refused(name: str, allowed: float, refused: float):
+    assert vars(OpenPBRBsdf(**{name: allowed}))[name] == F4(allowed)
+    with pytest.raises(SceneError, match=f"OpenPBRBsdf {name}"):
+        OpenPBRBsdf(**{name: refused})
 
 
 def test_unknown_parameters_are_refused():

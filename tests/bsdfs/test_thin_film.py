@@ -90,6 +90,38 @@ def test_gaussians_fit_the_matching_functions(path):
         assert abs(ours - exact) < 0.05
 
 
+def test_gaussians_have_the_integrals_of_the_matching_functions():
+    """To what their coefficients are rounded to: light of equal energy is 1 in each channel."""
+    for number in range(3):
+        total = sum(a * np.sqrt(2 * np.pi * v) for n, a, _, v in GAUSSIANS if n == number)
+        assert total == pytest.approx(WHITE, rel=2e-3)
+
+
+def test_all_is_reflected_before_a_film_of_a_lower_index():
+    """Within glass, beyond the critical angle of the film and below it."""
+    for cos, total in ((0.5, True), (0.7, False)):
+        seen = film_reflectance(F4([cos]), F4([300]), F4([1.2]), F4(1.5), np.full((3, 1), 1.7, F4))
+        assert (seen == 1).all() == total
+        assert (seen <= 1).all()
+
+
+def test_no_film_reflects_more_than_all():
+    """Where the series of six terms is above 1, as on metals."""
+    rng = np.random.default_rng(0)
+    for _ in range(50):
+        eta, k = rng.uniform(0.1, 3, (3, 1)), rng.uniform(0, 6, (3, 1))
+        cos, nanometers, film = rng.random(50), rng.uniform(0, 1000, 50), rng.uniform(1, 2.5, 50)
+        seen = film_reflectance(*(x.astype(F4) for x in (cos, nanometers, film)), F4(1), eta.astype(F4), k)
+        assert (seen <= 1).all()
+
+
+def test_channels_of_a_film_have_their_own_indices():
+    cos, film, beyond = F4([0.7]), F4([[1.3], [1.35], [1.4]]), F4([[1.5], [1.6], [1.7]])
+    together = film_reflectance(cos, F4([400]), film, F4(1), beyond)
+    alone = [film_reflectance(cos, F4([400]), film[k], F4(1), beyond)[k] for k in range(3)]
+    assert together == pytest.approx(np.array(alone), rel=1e-6)
+
+
 @pytest.mark.parametrize("thickness", [-1, 100_001, np.nan])
 def test_bad_thicknesses_are_named(thickness):
     with pytest.raises(SceneError, match="Conductor film_thickness"):

@@ -53,6 +53,28 @@ def test_a_spot_shows_its_picture_in_the_square_around_its_cone() -> None:
         assert arriving(plain, points)[0, 0] > 0
 
 
+def test_half_of_the_sky_has_a_picture_without_edges() -> None:
+    """Red and green are at the left and right above, however far away from the middle."""
+    light = wf.SpotLight((0, 0, 0), 5, picture=QUARTERS, up=(0, 0, -1), direction=(0, -1, 0), angle=180)
+    for far in (0.1, 10):
+        points = [[-far, -1, -far], [far, -1, -far], [-far, -1, far]]
+        assert (arriving(light, points) > 0).tolist() == np.eye(3, dtype=bool).tolist()
+
+
+def test_up_along_the_axis_is_any_direction() -> None:
+    """The picture is then turned by any angle, but whole."""
+    light = wf.Projector((0, 0, 0), np.full((2, 2, 3), 0.5), 8, direction=(0, -1, 0), fov=90)
+    points = [[x, -1, z] for x in (-0.6, 0, 0.6) for z in (-0.6, 0, 0.6)]
+    screen = arriving(light, points) / np.linalg.norm(points, axis=1)
+    assert screen == pytest.approx(np.full((3, 9), 4), rel=1e-5)
+
+
+def test_defaults() -> None:
+    light = wf.Projector((0, 1, 0), QUARTERS, target=(0, 0, 0))
+    assert (light.intensity.ravel().tolist(), light.fov, light.up.tolist()) == ([1] * 3, 45, [0, 1, 0])
+    assert wf.Projector((0, 1, 0), QUARTERS, target=(0, 0, 0), fov=0.5).fov == 0.5
+
+
 @pytest.mark.parametrize("blend", [0.0, 0.4, 1.0])
 def test_a_linear_falloff(blend: float) -> None:
     """Mitsuba 3's spot: linear in the angle between both ends; its power is the integral."""
@@ -72,12 +94,20 @@ def test_a_linear_falloff(blend: float) -> None:
 
 
 def test_power_of_a_projector_is_the_integral() -> None:
+    """Over a screen of the size of the picture; a white one is nowhere brighter than in its corners."""
+    axis, up = np.array([0.6, -0.64, 0.48]), np.array([0, 0.6, 0.8])  # perpendicular
+    light = wf.Projector((0, 0, 0), QUARTERS, (2, 4, 6), direction=axis, up=up, fov=70)
+    rng, edge = np.random.default_rng(0), np.tan(np.radians(35))
+    x, y = rng.uniform(-edge, edge, (2, 100_000, 1))
+    points = axis + x * np.cross(axis, up) + y * up
+    flux = arriving(light, points) / np.linalg.norm(points, axis=1) * 4 * edge**2
+    assert light.record(ORIGIN).power(1.0) == pytest.approx(flux.mean(0).mean(), rel=5e-3)
+    white = wf.Projector((0, 0, 0), np.ones((1, 1, 3)), (2, 4, 6), direction=axis, up=up, fov=70)
+    corner = axis + 0.9999 * edge * (np.cross(axis, up) + up)
+    bound = white.record(ORIGIN).irradiance(corner.reshape(3, 1), 1e-7, 9.0)
+    assert bound == pytest.approx(arriving(white, [corner]).mean(), rel=1e-3)
     light = wf.Projector((0, 0, 0), QUARTERS, (2, 4, 6), direction=(0, 0, -1), fov=90)
-    rng = np.random.default_rng(0)
-    points = np.concatenate([rng.uniform(-1, 1, (100_000, 2)), -np.ones((100_000, 1))], 1)
-    flux = arriving(light, points) / np.linalg.norm(points, axis=1) * 4
     record = light.record(ORIGIN)
-    assert record.power(1.0) == pytest.approx(flux.mean(0).mean(), rel=1e-2)
     bound = record.irradiance(np.array([[0.9], [0.9], [-1]]), 0.05, 9.0)[0, 0]
     assert bound >= arriving(light, [[0.9, 0.9, -1], [0.92, 0.88, -1]]).mean(0).max()
 

@@ -112,6 +112,33 @@ def test_no_place_is_thought_darker_than_it_is(angle: float, blend: float, seed:
     )
 
 
+@pytest.mark.parametrize("falloff", ["smooth", "linear"])
+@pytest.mark.parametrize(("angle", "blend"), [(40.0, 0.5), (170.0, 1.0)])
+def test_what_is_thought_of_a_small_ball_is_what_arrives(angle: float, blend: float, falloff: Any) -> None:
+    """By both falloffs, also where they take more than a radian; a ball around the light gets I/r²."""
+    light = wf.SpotLight((0, 0, 0), 3.0, direction=(0, -1, 0), angle=angle, blend=blend, falloff=falloff)
+    outer, inner = angle / 2, angle / 2 * (1 - blend)
+    shape = {
+        "smooth": partial(gltf_cone, outer=outer, inner=inner),
+        "linear": lambda degrees: float(np.clip((outer - degrees) / (outer - inner), 0, 1)),
+    }[falloff]
+    record = light.record(ORIGIN)
+    for degrees in np.array([0, 0.3, 0.6, 0.9, 1.1]) * outer:
+        assert intensity(light, degrees) == pytest.approx(3 * shape(degrees), abs=1e-4)
+        theta = np.radians(degrees)
+        center = 2 * np.array([[np.sin(theta)], [-np.cos(theta)], [0]])
+        assert record.irradiance(center, 1e-7, 9.0) == pytest.approx(0.75 * shape(degrees), abs=1e-4)
+    assert record.irradiance(np.array([[0.1], [0.2], [0]]), 0.5, 9.0) == pytest.approx(3 / 0.5**2)
+    theta = np.radians(outer) * (np.arange(4000) + 0.5) / 4000
+    solid_angle = 2 * np.pi * np.sin(theta) * [shape(each) for each in np.degrees(theta)]
+    assert record.power(1.0) == pytest.approx(3 * solid_angle.mean() * np.radians(outer), rel=1e-4)
+
+
+def test_defaults() -> None:
+    spot = wf.SpotLight((0, 1, 0), 1, target=(0, 0, 0))
+    assert (spot.angle, spot.blend, spot.falloff, spot.up.tolist()) == (45, 0.15, "smooth", [0, 1, 0])
+
+
 @pytest.mark.parametrize("make", [wf.SpotLight, partial(wf.Projector, picture=np.ones((2, 2, 3)))])
 def test_a_target_gives_the_direction_once(make: Callable[..., Any]) -> None:
     light = make(position=(0, 4, 0), intensity=1, target=(0, 0, 0))

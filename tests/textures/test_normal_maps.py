@@ -414,6 +414,19 @@ def test_upright_normals_mirror_to_above_the_surface():
     assert ((mirrored * ng).sum(0) >= np.minimum(0.9 * cos, 0.01) * 0.9)[clear].all()
 
 
+@pytest.mark.parametrize(("cosine", "least", "lean"), [(0.3, 0.01, 15), (0.005, 0.9 * 0.005, 0.1)])
+def test_reflections_are_raised_to_a_cosine_that_is_shallower(cosine, least, lean):
+    """To 0.01 with the surface, or to 0.9 of that of wo, before the direction is normalized."""
+    wo, angle = np.array([[np.sqrt(1 - cosine**2)], [0], [cosine]]), np.radians(-lean)
+    perturbed, ng = np.array([[np.sin(angle)], [0], [np.cos(angle)]]), np.array([[0.0], [0], [1]])
+    low = 2 * (perturbed * wo).sum() * perturbed - wo
+    assert low[2, 0] < least
+    size = np.sqrt(low[0, 0] ** 2 + least**2)
+    normal = ensure_valid_reflection(wo, ng, ng.copy(), perturbed)
+    reflected = 2 * (normal * wo).sum() * normal - wo
+    assert reflected[2, 0] == pytest.approx(least / size, rel=1e-4)
+
+
 def test_a_faint_normal_map_changes_little_where_normals_are_smooth():
     """Interpolated normals may mirror to below their facet; a normal map is not to blame for that."""
     n = 10_000

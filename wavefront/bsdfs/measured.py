@@ -120,7 +120,7 @@ class Measured(JointBsdf):
         unbound = self.tangent is None or isinstance(self.tangent, BaseTexture)
         cos, sin = (one, one * f4(0)) if unbound else self.tangent
         x, y = wo[0] * cos + wo[1] * sin, wo[1] * cos - wo[0] * sin
-        flip_y = np.where(y > 0, -one, one) if self.data.mirrors > 1 else one
+        flip_y = np.where(np.signbit(y), one, -one) if self.data.mirrors > 1 else one
         flip_x = np.where(x > 0, -one, one) if self.data.mirrors == 4 else flip_y
         return cos, sin, flip_x, flip_y
 
