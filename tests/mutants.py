@@ -388,7 +388,6 @@ def apply(mutant: Mutant) -> None:
                 if other is not None and getattr(other, "__dict__", {}).get(key) is old:
                     setattr(other, key, new)
 
-
     for module in list(sys.modules.values()):  # what the unchanged tests have left in caches
         if (getattr(module, "__file__", None) or "").startswith(OURS):
             for value in list(vars(module).values()):

@@ -319,6 +319,31 @@ def test_what_escapes_a_rough_boundary(ior, roughness):
     assert escaping[0] == pytest.approx((1 - reflected) / max(ior, 1) ** 2, abs=6e-3)
 
 
+@pytest.mark.parametrize("roughness", [0.5, 1.0])
+@pytest.mark.parametrize("ior", [1.2, 1.5])
+def test_tables_of_a_rough_boundary(ior, roughness):
+    """What is reflected and what is let in once, by quadrature of Walter et al. over the facets."""
+    alpha = roughness**2
+    (t, wide), (phi, turn) = midpoints(400), midpoints(100, 0, 2 * np.pi)
+    t, phi = (each.ravel() for each in np.meshgrid(t, phi))
+    theta = np.arctan(alpha * t / (1 - t))
+    m = np.stack([np.sin(theta) * np.cos(phi), np.sin(theta) * np.sin(phi), np.cos(theta)])
+    facet = ggx(m[2], alpha) * np.sin(theta) * alpha / (1 - t) ** 2 / (1 + np.tan(theta) ** 2) * wide * turn
+    whole, entered = (boundary_tables(ior, roughness, False, False, again)[0][0] for again in (True, False))
+    for k in (10, 40, 63):
+        mu = k / 63
+        wo = column((np.sqrt(1 - mu * mu), 0, mu))
+        cos = (wo * m).sum(0)
+        seen = facet * np.maximum(cos, 0) / mu
+        reflected = fresnel(np.maximum(cos, 1e-9), ior)
+        above = 2 * cos * m[2] - mu
+        kept = (above > 0) / (1 + smith(wo[2], alpha) + smith(np.maximum(above, 1e-9), alpha))
+        assert whole[k] == pytest.approx(1 - (seen * reflected * kept).sum(), abs=2e-4)
+        along = (cos / ior - np.sqrt(np.maximum(1 - (1 - cos**2) / ior**2, 0))) * m[2] - mu / ior
+        kept = (along < 0) / (1 + smith(wo[2], alpha) + smith(np.maximum(-along, 1e-9), alpha))
+        assert entered[k] == pytest.approx((seen * (1 - reflected) * kept).sum(), abs=2e-4)
+
+
 @pytest.mark.parametrize("roughness", [0.0, 0.4])
 @pytest.mark.parametrize("ior", [1e-6, 1e-3, 1e3, 1e6])
 def test_plastic_of_any_index_is_finite_and_reflects_no_more_than_all(ior, roughness):

@@ -11,7 +11,9 @@ from test_bsdfs import Constant, surface
 
 import wavefront as wf
 from wavefront.bsdfs import Bsdf, Conductor, Dielectric, OpenPBRBsdf, Plastic, Principled, ThinDielectric
-from wavefront.bsdfs.energy import Shape, loss, mean_over_cosines, part_kept, scaling
+from wavefront.bsdfs.energy import Shape, gain, loss, mean_over_cosines, part_kept, scaling
+from wavefront.bsdfs.fresnel import fresnel_dielectric
+from wavefront.bsdfs.microfacet import reflect, refract
 from wavefront.bsdfs.rough import RoughBsdf
 from wavefront.textures.parameter import scalar
 
@@ -280,6 +282,41 @@ def test_the_lobe_of_glass_returns_what_is_lost(ior: float, across: float | None
             value, density, chance = table.lobe(glass, wo, wi, inside, stretched)
             energy = value * np.abs(wi[2]) * np.where(wi[2] < 0, eta**2, 1) / density
             assert energy.mean(dtype=float) == pytest.approx(chance[0], rel=5e-3)
+
+
+@pytest.mark.parametrize(
+    ("along", "across", "gained", "left"),
+    [(0.9, 0.4, 0.003, 0.0015), (0.5, 0.9, 0.0015, 0.0015), (0.7, None, 0.0005, 0.0008)],
+)
+def test_tables_hold_what_is_lost(along: float, across: float | None, gained: float, left: float) -> None:
+    """Of a white metal that is 0, of glass what sums over facets say: root mean squares over directions."""
+    rng, n, count = np.random.default_rng(0), 1 << 14, 100
+    u = ((0.5 + np.arange(n) * np.array([[0.7548776662], [0.5698402910]])) % 1).astype(F4)  # evenly spread
+    metal, glass = METAL(along, roughness_v=across), Dielectric(1.5, along, roughness_v=across)
+    facets, table = metal.facets(), loss(glass.shape, 1.5)
+    of_metal, of_glass = [], []
+    for mu, turn in zip(rng.uniform(0.1, 1, count), rng.uniform(0, 2 * np.pi, count), strict=True):
+        wo = toward(mu, turn, n)
+        m = facets.visible_normals(wo, u)
+        wi, seen = reflect(wo, m), np.maximum((wo * m).sum(0), 0)
+        above = np.where(wi[2] > 0, facets.weight(wo, wi, m) * gain(metal, wo, wi), 0)
+        of_metal.append(1 - above.mean(dtype=float))
+        for inside, eta in ((False, F4(1.5)), (True, F4(1 / 1.5))):
+            reflected, cos = fresnel_dielectric(seen, np.full(1, eta))
+            wi = refract(wo, m, seen, cos, eta)
+            below = np.where(wi[2] < 0, facets.weight(wo, wi, m), 0)
+            lost = 1 - (reflected * above + (1 - reflected) * below).mean(dtype=float)
+            of_glass.append(float(table.at(glass, wo[:, :1], np.array([inside]))[0]) - lost)
+    assert np.sqrt(np.mean(np.square(of_metal))) < gained
+    assert np.sqrt(np.mean(np.square(of_glass))) < left
+
+
+def test_as_much_crosses_either_way() -> None:
+    """The mean transmittance of a smooth boundary, 1 − ∫ 2μ·F dμ from the rarer side."""
+    mu = (np.arange(4000) + F4(0.5)) / F4(4000)
+    passed = 1 - (2 * mu * fresnel_dielectric(mu, np.full(1, F4(1.5)))[0]).mean(dtype=float)
+    for ior in (1.5, 1 / 1.5):
+        assert loss(Dielectric(ior, 0.7).shape, ior).passed == pytest.approx(passed, rel=1e-3)
 
 
 def test_glass_within_glass_is_without() -> None:
