@@ -136,7 +136,7 @@ def test_light_that_crosses_passes_a_coat_once():
 
 
 def test_the_thickness_of_a_film_is_in_micrometers():
-    """The base below gets and returns what the film lets pass, as in `Principled`; the mean is over cosines."""
+    """The base below gets and returns what the film lets pass, as in `Principled`."""
     given = {"thin_film_weight": 1.0, "thin_film_thickness": 0.4, "specular_ior": 1.8}
     given["specular_roughness"] = 0.1  # so that facets reflect as the surface does
 
