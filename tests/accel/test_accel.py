@@ -162,7 +162,7 @@ def accelerator(request: pytest.FixtureRequest) -> Iterator[Accelerator]:
     return request.getfixturevalue(request.param)
 
 
-@pytest.mark.parametrize("size", [1, 64, 4096])
+@pytest.mark.parametrize("size", [1, pytest.param(64, marks=pytest.mark.slow), 4096])
 def test_batches_have_the_same_bits(accelerator: Accelerator, size: int) -> None:
     check_batches(accelerator, size)
 

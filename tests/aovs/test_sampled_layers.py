@@ -118,6 +118,7 @@ def test_direct_light_is_that_of_direct_mis(integrator: str) -> None:
     assert same_mean(image, brighter, "direct", "rgb") < ALPHA  # it would be seen
 
 
+@pytest.mark.slow
 def test_branches_change_no_layer() -> None:
     one = render(room(16), 256, aovs=EVERYTHING, seed=1)
     three = render(room(16), 128, aovs=EVERYTHING, seed=2, branches=3)

@@ -34,6 +34,7 @@ def furnace(shape, spp, **options):
     return Mean.of(rgb.mean(-1, dtype=float).ravel())
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("subdivisions", [2, 4], ids=["320", "5120"])
 def test_a_ball_of_smooth_shaded_glass_loses_no_light(subdivisions):
     mean = furnace(ball(subdivisions, wf.Dielectric(1.5)), spp=64)
@@ -51,13 +52,14 @@ CLEAR = {
 
 
 @pytest.mark.parametrize("name", CLEAR)
-@pytest.mark.parametrize("integrator", ["naive", "full"])
+@pytest.mark.parametrize("integrator", [pytest.param("naive", marks=pytest.mark.slow), "full"])
 def test_every_clear_material_keeps_its_light(name, integrator):
     mean = furnace(ball(2, CLEAR[name]), spp=32, integrator=integrator)
     assert mean.error < 2e-4
     assert mean.value == pytest.approx(1, abs=6e-4)
 
 
+@pytest.mark.slow
 def test_rough_glass_loses_no_more_than_on_a_sphere():
     glass = wf.Dielectric(1.5, 0.1)
     facets, sphere = furnace(ball(2, glass), spp=64), furnace(wf.Sphere((0, 0, 0), 1, material=glass), spp=64)
@@ -77,7 +79,7 @@ def test_normal_mapped_glass_loses_no_light():
 
 @pytest.mark.parametrize("roughness", [0.0, 0.4])
 @pytest.mark.parametrize("kind", [wf.Dielectric, wf.ThinDielectric])
-@pytest.mark.first(2)
+@pytest.mark.first(1)
 def test_estimators_agree_on_tilted_clear_surfaces(kind, roughness):
     """Directions that are turned have no density: no light sample finds them, and none counts twice."""
     area_light = wf.Sphere((0, 3, 0), 1.0, material=wf.Diffuse(0.0), emission=4.0)

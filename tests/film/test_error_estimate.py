@@ -52,6 +52,7 @@ def test_batches_are_few_and_not_too_few() -> None:
     assert [batch_size(n) for n in (1, 4, 8, 16, 32, 64, 256)] == [1, 1, 2, 4, 4, 8, 32]
 
 
+@pytest.mark.slow
 @given(st.integers(1, 70), st.data())
 def test_cutting_changes_no_bit(count: int, data) -> None:
     samples = np.random.default_rng(count).lognormal(0, 3, (3, count, 6)).astype(f4)

@@ -339,6 +339,7 @@ def test_guided_pictures_do_not_depend_on_workers_or_waves() -> None:
         assert np.array_equal(wf.render(scene, 4, guide=True, progress=False, **options).rgb, one.rgb)
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("short_training")
 def test_another_view_is_what_a_render_of_it_is() -> None:
     scene = lamp_at_the_ceiling()
@@ -351,6 +352,7 @@ def test_another_view_is_what_a_render_of_it_is() -> None:
         )
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("short_training")
 def test_branches_can_be_guided() -> None:
     plain = wf.render(room(), 256, branches=2, progress=False)

@@ -228,6 +228,7 @@ def test_files_of_the_other_kind_are_refused(before: bool, tmp_path: Path) -> No
 
 
 @pytest.mark.parametrize("name", ["paths", "0.high", "3.low"])
+@pytest.mark.first(1)
 def test_damaged_sums_are_named(name: str, tmp_path: Path) -> None:
     part(0, 2).save(tmp_path / "a.npz")
     with np.load(tmp_path / "a.npz") as archive:
@@ -296,6 +297,7 @@ def test_noise_ends_all_pixels_together() -> None:
 # --- Errors -------------------------------------------------------------------------------------------
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("sampler", ["independent", pytest.param("sobol", marks=pytest.mark.slow)])
 @pytest.mark.first(1)
 def test_the_standard_error_is_honest(sampler: str) -> None:
@@ -499,6 +501,7 @@ def test_no_splats_are_no_light() -> None:
         assert np.isnan(sums.squared_error()).all() if len(paths) == 1 else not sums.squared_error().any()
 
 
+@pytest.mark.slow
 def test_errors_are_those_of_the_scatter_of_batches() -> None:
     """Of equal ones the variance of their means over their number; of others as without bias."""
     brought = np.random.default_rng(2).random((4, 3))

@@ -445,7 +445,7 @@ def test_point_light_over_a_mirror_lights_the_ceiling_as_from_its_image() -> Non
 
 
 @pytest.mark.parametrize(("opacity", "copies"), [(0.6, 1), (1, 2), (1, 1)])
-@pytest.mark.first(2)
+@pytest.mark.first(1)
 def test_directional_light_in_a_mirror_lights_the_floor(opacity: float, copies: int) -> None:
     """Of mirrors at one place only the first reflects."""
     material = wf.Material(wf.Mirror(0.8), alpha=opacity)
@@ -455,6 +455,7 @@ def test_directional_light_in_a_mirror_lights_the_floor(opacity: float, copies: 
     assert_light(scene, opacity * 0.8 * ALBEDO / np.pi * 3 / np.sqrt(2), max_bounces=7)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("mirror_tilt", "floor_tilt"), [(0.05, 0.3), (-0.15, 0)])
 @pytest.mark.first(1)
 def test_directional_light_in_a_mirror_with_tilted_normals(mirror_tilt: float, floor_tilt: float) -> None:

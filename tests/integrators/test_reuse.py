@@ -386,6 +386,7 @@ def grouped(size: tuple[int, int] = (16, 16)) -> wf.Scene:
 @pytest.mark.parametrize(
     "options", [{"spp": 3}, {"spp": 2, "branches": 2}, {"spp": 33, "noise": 0.1}], ids=str
 )
+@pytest.mark.first(2)
 def test_groups_sum_to_the_picture(options: dict) -> None:
     """To rounding; the picture is that without them, whatever the waves."""
     scene, options = grouped((33, 30)), {**options, "reuse": True, "max_bounces": 3}

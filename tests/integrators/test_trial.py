@@ -111,6 +111,7 @@ def glossy(size: tuple[int, int]) -> wf.Scene:
     ],
     ids=["mix", "principled"],
 )
+@pytest.mark.first(1)
 def test_paths_are_shared_beside_gloss_where_light_is_hard_to_find(gloss: wf.Bsdf) -> None:
     """Neither a glossy floor nor a small ball of glass keeps the matte walls of a room from it."""
     scene = lamp_at_the_ceiling((256, 256))

@@ -166,7 +166,7 @@ class Flipping(wf.LightSampler):
 
 
 @pytest.mark.parametrize("environment", [0.0, 0.5])
-@pytest.mark.first(1)
+@pytest.mark.slow
 def test_pictures_do_not_depend_on_the_choice(environment: float) -> None:
     """By significance: lights above, below and at infinity, on matte, metal and glass, by cells and normals,
     by a tree, and by a user's sampler."""

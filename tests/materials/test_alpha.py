@@ -197,6 +197,7 @@ def leaves(size: tuple[int, int] = (16, 8)) -> wf.Scene:
     return wf.Scene(shapes, [wf.Environment(0.2)], camera)
 
 
+@pytest.mark.slow
 def test_estimators_agree() -> None:
     naive = repeat(leaves(), 32, integrator="naive", max_bounces=4)
     full = repeat(leaves(), 8, integrator="full", max_bounces=4, first_seed=100)

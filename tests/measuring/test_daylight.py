@@ -94,6 +94,7 @@ def test_light_of_the_sun_that_a_surface_reflects() -> None:
     assert abs(cosine - 0.8) < 0.1
 
 
+@pytest.mark.slow
 def test_up_and_north_turn_patches_and_points_alike() -> None:
     tree = ((0.5, 0.8, -1.0), 0.6)
     one = coefficients(wf.Scene([wf.Sphere(*tree)]), spp=2048)

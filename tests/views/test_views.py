@@ -121,7 +121,7 @@ def test_the_scene_is_compiled_once(calls_of: Any) -> None:
     assert len(calls) == 1
 
 
-@pytest.mark.parametrize("extension", [".gif", ".png", ".mp4"])
+@pytest.mark.parametrize("extension", [".gif", ".png", pytest.param(".mp4", marks=pytest.mark.slow)])
 def test_animations_are_read_back(extension: str, tmp_path: Path) -> None:
     path = tmp_path / f"a{extension}"
     values = (0.0, 0.2, 0.6, 1.0)
