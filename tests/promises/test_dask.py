@@ -93,6 +93,7 @@ def wait_for_stop(stop: SharedInt, job: int) -> int:
     return job
 
 
+@pytest.mark.slow  # one that begins late takes its 40 seconds
 def test_a_stop_ends_jobs_on_the_cluster(client: Any) -> None:
     """Those under way, on this machine, and those that have not begun."""
     stop = SharedInt()
