@@ -1264,7 +1264,7 @@ def plugin_table() -> str:
                 listed, read = (", ".join(f"`{each}`" for each in part) for part in (names, reads))
                 lines.append(f"| {kind} | {listed} | {read or '–'} | {note or '–'} |")
     lines += ["", "Not supported, and named in the warning:", ""]
-    for kind in dict.fromkeys(each.kind for each in PLUGINS.values()):
+    for kind in order:  # not that of the table, in which modules stand as they were imported
         names = [f"`{name}`" for name, each in PLUGINS.items() if each.kind == kind and each.convert is None]
         if names:
             lines.append(f"- {kind}: {', '.join(names)}")
