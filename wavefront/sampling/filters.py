@@ -29,13 +29,20 @@ def box(u: Floats) -> Floats:
     return u
 
 
-def _check_radius(of: object, radius: float) -> None:
-    name = f"{type(of).__name__} radius"
-    number(name, radius, lambda x: 0 < x <= MOST_PIXELS, f"above 0 and at most {MOST_PIXELS} pixels")
+@dataclass(frozen=True)
+class _RadiusFilter:
+    """A filter that ends at a radius, in pixels."""
+
+    radius: float
+
+    def __post_init__(self) -> None:
+        """Check the radius."""
+        name, limit = f"{type(self).__name__} radius", f"above 0 and at most {MOST_PIXELS} pixels"
+        number(name, self.radius, lambda x: 0 < x <= MOST_PIXELS, limit)
 
 
 @dataclass(frozen=True)
-class BoxFilter:
+class BoxFilter(_RadiusFilter):
     """A reconstruction filter that weighs the square around a pixel's center evenly.
 
     Parameters
@@ -55,17 +62,13 @@ class BoxFilter:
 
     radius: float = 0.5
 
-    def __post_init__(self) -> None:
-        """Check the radius."""
-        _check_radius(self, self.radius)
-
     def __call__(self, u: Floats) -> Floats:
         """Return positions (2, n) from the pixel's corner, pixels, for u (2, n) in [0, 1)²."""
         return CENTER + (f4(2) * u - f4(1)) * f4(self.radius)
 
 
 @dataclass(frozen=True)
-class TentFilter:
+class TentFilter(_RadiusFilter):
     """A reconstruction filter that falls linearly from a pixel's center, in both directions.
 
     Parameters
@@ -85,17 +88,13 @@ class TentFilter:
 
     radius: float = 1.0
 
-    def __post_init__(self) -> None:
-        """Check the radius."""
-        _check_radius(self, self.radius)
-
     def __call__(self, u: Floats) -> Floats:
         """Return positions (2, n) from the pixel's corner, pixels, for u (2, n) in [0, 1)²."""
         return np.stack([CENTER + warp.tent(row, self.radius) for row in u])
 
 
 @dataclass(frozen=True)
-class GaussianFilter:
+class GaussianFilter(_RadiusFilter):
     """A reconstruction filter that is a Gaussian around a pixel's center, in both directions.
 
     Parameters
@@ -127,7 +126,7 @@ class GaussianFilter:
 
     def __post_init__(self) -> None:
         """Check the radius and the standard deviation."""
-        _check_radius(self, self.radius)
+        super().__post_init__()
         most = MOST_STDDEV * self.radius
         limit = f"above 0 and at most {most:g}, {MOST_STDDEV} times the radius"
         number("GaussianFilter stddev", self.stddev, lambda x: 0 < x <= most, limit)
