@@ -254,3 +254,19 @@ def test_damaged_files_are_refused_or_read(tmp_path: Path, extension: str) -> No
             assert (found >= 0).all()
     assert 30 < len(refused) < 120
     assert all(str(path) in message for message in refused)
+
+
+@pytest.mark.parametrize(
+    "name", ["/etc/passwd", "../out.tlt", "link.tlt", "file:///etc/passwd", "a/../../out.tlt"]
+)
+def test_a_table_of_tilt_elsewhere_is_not_read(tmp_path: Path, name: str) -> None:
+    home = tmp_path / "home"
+    home.mkdir()
+    (tmp_path / "out.tlt").write_text("secret")
+    (home / "link.tlt").symlink_to(tmp_path / "out.tlt")
+    (home / "a.ies").write_text(PLAIN.replace("TILT=NONE", f"TILT={name}"))
+    with pytest.raises(
+        wf.SceneError, match="refers to .*(outside|absolute|only files in its folder)"
+    ) as error:
+        wf.IESLight(home / "a.ies", (0, 1, 0))
+    assert "secret" not in str(error.value)

@@ -22,6 +22,7 @@ from ..arrays.vec import Doubles
 from ..core.errors import SceneError, warn_caller
 from ..core.files import decode_text, extension_of, path_name, read_bytes
 from ..core.plural import plural
+from ..core.references import followed
 
 MOST_BYTES = 2**25
 MOST = 1e9  # the largest number that makes sense
@@ -105,7 +106,8 @@ def luminaire_texts(path: str | os.PathLike[str]) -> tuple[str, str, str]:
     Raises
     ------
     SceneError
-        If a file is missing or too large, or of another kind.
+        If a file is missing or too large, or of another kind, or the second one is outside the first one's
+        folder.
     """
     name = path_name(path)
     if extension_of(path, EXTENSIONS) not in EXTENSIONS:
@@ -114,8 +116,10 @@ def luminaire_texts(path: str | os.PathLike[str]) -> tuple[str, str, str]:
     tilt = TILT.search(text) if name.lower().endswith(".ies") else None
     if tilt is None or tilt[1].upper() in ("NONE", "INCLUDE", ""):
         return name, text, ""
+    folder = Path(name).resolve().parent
+    (beside,) = followed(name, tilt[1], [folder], [folder])
     try:
-        return name, text, decode_text(read_bytes(Path(name).parent / tilt[1], MOST_BYTES))
+        return name, text, decode_text(read_bytes(beside, MOST_BYTES))
     except SceneError as error:
         raise SceneError(f"{name}: TILT={tilt[1]}: {error}") from error
 

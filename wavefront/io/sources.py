@@ -16,13 +16,11 @@ from ..codecs.budget import MEMORY_BYTES, Budget
 from ..codecs.images import read_codes
 from ..core.errors import SceneError
 from ..core.files import MAX_BYTES, MAX_PIXELS, check_regular, path_name, read_bytes
+from ..core.references import GZIPPED, followed
 
 PathLike = str | os.PathLike[str]
 
 MAX_TRIANGLES = 2**26  # of all meshes of a file by default
-ARCHIVES = (".npz", ".zip", ".gz", ".tar", ".7z", ".bz2", ".xz", ".zst")
-GZIPPED = (".ply.gz", ".pbrt.gz")  # the files of pbrt that may be packed
-SCHEMES = ("http:", "https:", "file:", "ftp:")
 
 
 @dataclass(frozen=True)
@@ -140,26 +138,8 @@ class SceneFiles:
             not a regular one.
         """
         source = self.scene if base is None else base
-        name = reference.replace("\\", "/")
-        if "://" in name or name.lower().startswith(SCHEMES):
-            raise SceneError(
-                f"{source}: refers to {reference!r}; only files in its folder and the search paths are read"
-            )
-        if name.lower().endswith(ARCHIVES) and not name.lower().endswith(GZIPPED):
-            raise SceneError(f"{source}: refers to {reference!r}; archives are not read")
-        if name.startswith("/") or name[1:2] == ":":
-            raise SceneError(f"{source}: refers to {reference!r}; an absolute path is not followed")
-        folder = _folder(source)
         roots = [_folder(self.scene), *(each.resolve() for each in self.search_paths)]
-        allowed = [
-            place / name
-            for place in (folder, *roots[1:])
-            if any(self._target(place, name, reference).is_relative_to(root) for root in roots)
-        ]
-        if not allowed:
-            raise SceneError(
-                f"{source}: refers to {reference!r}, which is outside its folder and the search paths"
-            )
+        allowed = followed(source, reference, (_folder(source), *roots[1:]), roots)
         found = next((path for path in allowed if os.path.exists(path)), None)
         if found is not None:
             check_regular(found, self.limits.file_bytes)
@@ -191,13 +171,6 @@ class SceneFiles:
             check_regular(path, self.limits.file_bytes)
             self._images[path] = read_codes(path, self.budget)
         return self._images[path]
-
-    def _target(self, folder: Path, name: str, reference: str) -> Path:
-        """Return where a name in a folder leads to."""
-        try:
-            return (folder / name).resolve()
-        except (OSError, RuntimeError, ValueError) as error:
-            raise SceneError(f"{self.scene}: refers to {reference!r}: {error}") from error
 
 
 def _unpacked(name: str, data: bytes, most: int) -> bytes:
