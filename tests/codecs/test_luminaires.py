@@ -266,7 +266,7 @@ def test_a_table_of_tilt_elsewhere_is_not_read(tmp_path: Path, name: str) -> Non
     (home / "link.tlt").symlink_to(tmp_path / "out.tlt")
     (home / "a.ies").write_text(PLAIN.replace("TILT=NONE", f"TILT={name}"))
     with pytest.raises(
-        wf.SceneError, match="refers to .*(outside|absolute|only files in its folder)"
+        wf.SceneError, match=r"refers to .*(outside|absolute|only files in its folder)"
     ) as error:
         wf.IESLight(home / "a.ies", (0, 1, 0))
     assert "secret" not in str(error.value)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import time
+import tracemalloc
 from pathlib import Path
 from typing import Any
 
@@ -278,3 +280,40 @@ def test_a_default_that_is_given_counts_before_the_scene(
 def test_a_file_keeps_the_medium_around(tmp_path: Path) -> None:
     fog = "<sensor type='perspective'> <medium type='homogeneous' id='fog'/> </sensor>"
     assert isinstance(load(tmp_path, BALL + fog).medium, wf.Medium)
+
+
+def test_a_dollar_sign_may_stand_for_itself(tmp_path: Path) -> None:
+    body = """<default name="a" value="x"/> <default name="ab" value="y"/>
+    <shape type="sphere"> <string name="s" value="\\$\\$a$a\\$$ab$abc$$"/> </shape>"""
+    with pytest.raises(wf.SceneError, match=r"line \d+: the parameter \$ has no value"):
+        dictionary(tmp_path, body)
+    assert dictionary(tmp_path, body.replace('$$"', '"'))["_arg_0"]["s"] == "$$ax$yyc"
+
+
+def test_the_text_of_parameters_counts_as_memory_of_the_load(tmp_path: Path) -> None:
+    """Each value is ten times the one before; 554 bytes would be a third of a gigabyte."""
+    values = ["x" * 3, *(f"$a{level}" * 10 for level in range(8))]
+    body = "".join(f'<default name="a{level}" value="{value}"/>' for level, value in enumerate(values))
+    tracemalloc.start()
+    with pytest.raises(wf.SceneError, match=r"line \d+: the value of \$a\d takes .*LoadLimits\.memory_bytes"):
+        dictionary(tmp_path, body + '<shape type="$a8"/>')
+    assert tracemalloc.get_traced_memory()[1] < 2**27
+    tracemalloc.stop()
+
+
+def test_many_parameters_take_time_in_proportion(tmp_path: Path) -> None:
+    def seconds(count: int) -> float:
+        body = "".join(f'<default name="n{i}" value="1"/>' for i in range(count))
+        body += "".join(
+            f'<shape type="sphere"><float name="radius" value="$n{i}"/></shape>' for i in range(count)
+        )
+        begin = time.process_time()
+        dictionary(tmp_path, body)
+        return time.process_time() - begin
+
+    assert seconds(4000) < 16 * max(seconds(500), 0.01)  # 64 times where each looks at all others
+
+
+def test_names_of_parameters_are_short(tmp_path: Path) -> None:
+    with pytest.raises(wf.SceneError, match=r"line \d+: the name of a parameter has more than 256 letters"):
+        dictionary(tmp_path, f'<default name="{"a" * 257}" value="1"/>')

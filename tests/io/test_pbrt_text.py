@@ -5,6 +5,7 @@ from __future__ import annotations
 import gzip
 import random
 import time
+import tracemalloc
 import warnings
 from pathlib import Path
 
@@ -286,3 +287,19 @@ def test_the_command_line_renders_a_scene(tmp_path: Path, capsys: pytest.Capture
     assert "camera" in capsys.readouterr().out
     assert main(["render", str(path), "-o", str(tmp_path / "out.npy"), "--quiet"]) == 0
     assert np.load(tmp_path / "out.npy").shape == (6, 8, 3)
+
+
+@pytest.mark.parametrize("honest", [True, False], ids=["says its size", "denies its size"])
+@pytest.mark.parametrize("name", ["big.pbrt.gz", "big.ply.gz"])
+def test_packed_files_are_refused_before_they_are_unpacked(tmp_path: Path, name: str, honest: bool) -> None:
+    """Of one that says its size nothing is unpacked, and of another one as much as it may have."""
+    packed = gzip.compress(b" " * 2**26)
+    (tmp_path / name).write_bytes(packed if honest else packed[:-4] + bytes(4))
+    use = 'Include "big.pbrt.gz"' if "pbrt" in name else 'Shape "plymesh" "string filename" "big.ply.gz"'
+    tracemalloc.start()
+    with pytest.raises(SceneError, match=f"{name}: has more than 8388608 bytes unpacked"):
+        load(tmp_path, use, limits=wf.LoadLimits(unpacked_bytes=2**23))
+    assert tracemalloc.get_traced_memory()[1] < (2**21 if honest else 2**24)
+    with pytest.raises(SceneError, match=rf"{name}: what it holds takes .*LoadLimits\.memory_bytes"):
+        load(tmp_path, use, limits=wf.LoadLimits(memory_bytes=2**10))
+    tracemalloc.stop()

@@ -2,16 +2,19 @@
 
 from __future__ import annotations
 
+import gzip
 import os
 import zlib
 from collections.abc import Iterable
 from dataclasses import dataclass, field, fields
+from io import BytesIO
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from ..codecs.archive import PIECE
 from ..codecs.budget import MEMORY_BYTES, Budget
 from ..codecs.images import read_codes
 from ..core.errors import SceneError
@@ -20,6 +23,7 @@ from ..core.references import GZIPPED, followed
 
 PathLike = str | os.PathLike[str]
 
+MOST_DEFLATED = 1032  # bytes that a byte of deflate stands for at most
 MAX_TRIANGLES = 2**26  # of all meshes of a file by default
 
 
@@ -160,10 +164,26 @@ class SceneFiles:
             If it cannot be read, or a packed file is damaged or larger than `limits.unpacked_bytes`.
         """
         data = read_bytes(path, self.limits.file_bytes)
-        if os.fspath(path).lower().endswith(GZIPPED):
-            data = _unpacked(os.fspath(path), data, self.limits.unpacked_bytes)
         self.budget.add_file(len(data))
-        return data
+        return self._unpacked(path, data) if os.fspath(path).lower().endswith(GZIPPED) else data
+
+    def _unpacked(self, path: PathLike, data: bytes) -> bytes:
+        """Return the content of a gzip file, unpacked in pieces that are charged to the budget."""
+        name, content = os.fspath(path), BytesIO()
+        size, most = _claimed(data), self.limits.unpacked_bytes
+        try:
+            with gzip.GzipFile(fileobj=BytesIO(data)) as packed:
+                while size <= most and (piece := packed.read(PIECE)):
+                    size = max(size, content.tell() + len(piece))
+                    self.budget.charge(f"{name}: what it holds", 2 * len(piece))  # also what becomes of it
+                    content.write(piece)
+        except EOFError as error:
+            raise SceneError(f"{name}: ends before its gzip stream does") from error
+        except (OSError, zlib.error) as error:
+            raise SceneError(f"{name}: is no gzip file: {error}") from error
+        if size > most:
+            raise SceneError(f"{name}: has more than {most} bytes unpacked (LoadLimits.unpacked_bytes)")
+        return content.getvalue()
 
     def image(self, path: Path) -> NDArray[Any]:
         """Return the pixels of an image as stored, (H, W, C); each file is read once."""
@@ -173,18 +193,10 @@ class SceneFiles:
         return self._images[path]
 
 
-def _unpacked(name: str, data: bytes, most: int) -> bytes:
-    """Return the content of a gzip file."""
-    unpacker = zlib.decompressobj(31)
-    try:
-        content = unpacker.decompress(data, most + 1)
-    except zlib.error as error:
-        raise SceneError(f"{name}: is no gzip file: {error}") from error
-    if len(content) > most:
-        raise SceneError(f"{name}: has more than {most} bytes unpacked (LoadLimits.unpacked_bytes)")
-    if not unpacker.eof:
-        raise SceneError(f"{name}: ends before its gzip stream does")
-    return content
+def _claimed(data: bytes) -> int:
+    """Return the unpacked size that a gzip file claims in its last bytes, 0 if it cannot have it."""
+    claimed = int.from_bytes(data[-4:], "little")
+    return claimed if claimed <= MOST_DEFLATED * len(data) else 0
 
 
 def _folder(path: PathLike) -> Path:

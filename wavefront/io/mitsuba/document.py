@@ -14,6 +14,7 @@ from typing import Any
 
 import numpy as np
 
+from ...codecs.budget import PER_BYTE
 from ...core.errors import SceneError, one_of
 from ...core.suggestions import did_you_mean
 from ..conversion import check_included, placed
@@ -38,6 +39,7 @@ ATTRIBUTES = {  # of the elements that are no plugins: those that must be there,
     "default": (("name", "value"), ()),
     "path": (("value",), ()),
 }
+MOST_LETTERS = 256  # of the name of a parameter $name
 UNNAMED = "_arg_"  # the names of parameters without one begin with this
 TO_UV = {"uoffset": (0, 3), "voffset": (1, 3), "uscale": (0, 0), "vscale": (1, 1)}  # before version 2
 
@@ -156,6 +158,8 @@ class Document:
         elif name == "alias":
             self._aliases[given["as"]] = self._aliases.get(given["id"], given["id"])
         elif name == "default":
+            if len(given["name"]) > MOST_LETTERS:
+                raise SceneError(f"{tag.place}: the name of a parameter has more than {MOST_LETTERS} letters")
             self._values.setdefault(given["name"], given["value"])
         elif name == "path":
             self._add_folder(given["value"], tag, path)
@@ -221,22 +225,30 @@ class Document:
         return {key: self._replaced(text, tag) for key, text in tag.attributes.items()}
 
     def _replaced(self, text: str, tag: Tag) -> str:
-        if "$" not in text:
-            return text
-        names = "|".join(map(re.escape, sorted(self._values, key=len, reverse=True)))
+        """Return a text with the values of its parameters, which are charged to the budget of the load."""
+        first, *rest = text.split("$")
+        parts = [first]
+        for piece in rest:
+            if parts[-1].endswith("\\"):  # \\$ is a dollar sign
+                parts[-1] = parts[-1][:-1]
+                parts += ["$", piece]
+                continue
+            name = self._longest(piece, tag)
+            value = self._values[name]
+            self._files.budget.charge(f"{tag.place}: the value of ${name}", PER_BYTE * len(value))
+            self._unused.discard(name)
+            parts += [value, piece[len(name) :]]
+        return "".join(parts)
 
-        def value(match: re.Match[str]) -> str:
-            if match[0] == "\\$":
-                return "$"
-            if match[1] is None:
-                name = re.match(r"\w*", text[match.start() + 1 :])
-                assert name is not None
-                hint = did_you_mean(name[0], self._values)
-                raise SceneError(f"{tag.place}: the parameter ${name[0]} has no value{hint}")
-            self._unused.discard(match[1])
-            return self._values[match[1]]
-
-        return re.sub(rf"\\\$|\$({names})|\$" if names else r"\\\$|\$()(?!)|\$", value, text)
+    def _longest(self, text: str, tag: Tag) -> str:
+        """Return the longest name of a parameter with which a text begins."""
+        for length in range(min(len(text), MOST_LETTERS), 0, -1):
+            if text[:length] in self._values:
+                return text[:length]
+        name = re.match(r"\w*", text)
+        assert name is not None
+        hint = did_you_mean(name[0], self._values)
+        raise SceneError(f"{tag.place}: the parameter ${name[0]} has no value{hint}")
 
 
 def parsed(name: str, data: bytes) -> Tag:
