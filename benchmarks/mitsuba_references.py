@@ -114,13 +114,13 @@ def rendered_here(folder: Path, scene: Path, spp: int) -> tuple[Any, str, float]
     One worker, whose time this process can tell. The picture is the same with more.
     """
     begin = time.process_time()
-    with warnings.catch_warnings(record=True) as caught:
-        warnings.simplefilter("always")
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
         loaded = wf.load(scene, search_paths=[folder], progress=False)
         picture = wf.render(loaded, spp, progress=False, workers=1)
     took = time.process_time() - begin
-    told = "; ".join(str(each.message).rpartition("not honored: ")[2] for each in caught)
-    return picture, "; ".join(dict.fromkeys(re.sub(r"line \d+: ", "", told).split("; "))), took
+    told = [each.said(str(scene)).removeprefix("not honored: ") for each in loaded.losses]
+    return picture, "; ".join(dict.fromkeys(re.sub(r"line \d+: ", "", each) for each in told)), took
 
 
 def rendered_there(mi: Any, scene: Path, spp: int, kind: str) -> tuple[wf.Image, float]:

@@ -70,6 +70,7 @@ from .sampling.filters import BoxFilter, GaussianFilter, TentFilter
 from .sampling.sampler import Sampler
 from .scene import Scene
 from .scene.lighting import studio
+from .scene.loss import Loss
 from .scene.sun_position import sun_position
 from .session import Session
 from .shapes import (
@@ -198,6 +199,7 @@ __all__ = [
     "LightSample",
     "LightSampler",
     "LoadLimits",
+    "Loss",
     "Material",
     "Measured",
     "Measurement",

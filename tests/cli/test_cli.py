@@ -119,7 +119,7 @@ def test_info_of_a_luminaire(tmp_path, capsys):
     path = tmp_path / "lamp.ies"
     path.write_text(lm63([0, 90], [0, 45, 90], [[50, 50], [20, 20], [50, 50]]))
     assert main(["info", str(path)]) == 0
-    said = f"{path}: luminaire of 219.9 lm, at most 50 cd, 9 × 2 angles\nwarnings: none\n"
+    said = f"{path}: luminaire of 219.9 lm, at most 50 cd, 9 × 2 angles\nlosses: none\n"
     assert capsys.readouterr().out == said
     path.write_text("TILT=NONE\n1 x")
     assert main(["info", str(path)]) == 2

@@ -203,13 +203,13 @@ def test_info_names_sizes_textures_and_warnings(mesh: Path, run, capsys) -> None
     assert lines[2] == "bounds: (0, 0, 0) to (1, 1, 1), (1, 1, 1) across"
     assert "5 × 3>, 3 channels, sRGB" in lines[lines.index("textures:") + 1]
     assert "wood" in lines[lines.index("materials:") + 1]
-    (count,) = (line for line in lines if line.startswith("warnings"))
+    (count,) = (line for line in lines if line.startswith("losses"))
     messages = lines[lines.index(count) + 1 :]
-    assert count == f"warnings: {len(messages)}"
-    assert any("dropped 1 face" in message for message in messages)
+    assert count == f"losses: {len(messages)}"
+    assert messages == ["  'wood': 1 face of zero area, first: line 15; left out"]
     mesh.write_text(TETRAHEDRON)
     assert cli.main(["info", str(mesh), "--quiet"]) == 0
-    assert capsys.readouterr().out.splitlines()[-1] == "warnings: none"
+    assert capsys.readouterr().out.splitlines()[-1] == "losses: none"
 
 
 def test_compare_shows_p_values(mesh: Path, run) -> None:

@@ -6,6 +6,7 @@ import pytest
 
 from wavefront.core.errors import SceneError
 from wavefront.io import obj
+from wavefront.io.losses import Losses
 from wavefront.io.text_lines import NUMBER
 
 
@@ -32,7 +33,7 @@ def test_a_long_word_is_checked_in_linear_time():
 def test_one_wide_line_does_not_widen_all_lines():
     rows = "v 0 0 0\nvt 0 0\nvn 0 0 1\n" * 5000
     wide = "".join(f"{keyword} 1 1{' 1' * 50_000}\n" for keyword in ("v", "vt", "vn"))
-    (raw,) = obj.parse("a.obj", rows + wide + "f 1/1/1 2/2/2 5001/5001/5001\n").raws
+    (raw,) = obj.parse(Losses("a.obj"), rows + wide + "f 1/1/1 2/2/2 5001/5001/5001\n").raws
     assert raw.vertices.tolist() == [[0, 0, 0], [0, 0, 0], [1, 1, 1]]
     assert raw.uvs.tolist() == [[0, 0], [0, 0], [1, 1]]
     assert raw.normals.tolist() == [[0, 0, 1], [0, 0, 1], [1, 1, 1]]
@@ -42,4 +43,4 @@ def test_one_wide_line_does_not_widen_all_lines():
 def test_only_blanks_and_tabs_separate_words_of_obj(blank):
     for line in (f"v 0{blank}0 0 0", f"v{blank}0 0 0", f"f 1 2{blank}3 4"):
         with pytest.raises(SceneError, match=r"a\.obj line 4: "):
-            obj.parse("a.obj", f"v 0 0 0\nv 1 0 0\nv 0 1 0\n{line}\nf 1 2 3\n")
+            obj.parse(Losses("a.obj"), f"v 0 0 0\nv 1 0 0\nv 0 1 0\n{line}\nf 1 2 3\n")

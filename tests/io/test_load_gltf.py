@@ -94,7 +94,7 @@ def test_triangles_without_an_area_join_strips(build, path):
     (mesh,) = load(path, strict=True).shapes
     found = soup(mesh)
     assert np.array_equal(found, corners[[[0, 1, 2], [2, 1, 3], [4, 5, 6], [6, 5, 7]]])
-    with pytest.warns(UserWarning, match="trimesh object: 'GLTF': dropped 4 faces of zero area"):
+    with pytest.warns(UserWarning, match="trimesh object: 'GLTF': 4 faces of zero area"):
         (held,) = from_trimesh(trimesh.load_scene(path, process=False)).shapes  # which keeps them
     assert np.array_equal(normal(held), normal(mesh))
 
@@ -206,7 +206,7 @@ def test_a_node_may_hold_many_instances(build, path):
 
 def test_what_instances_have_besides_is_named(build, path):
     instanced(build, TRANSLATION=np.float32([[0, 0, 0]]), _COLOR=np.float32([[1, 0, 0]])).gltf(path)
-    with pytest.warns(UserWarning, match=r"not honored: _COLOR of instances \(node 'grass'\)"):
+    with pytest.warns(UserWarning, match=r"not honored: node 'grass': _COLOR of instances"):
         assert len(load(path).shapes) == 1
 
 
@@ -512,7 +512,7 @@ def test_filters(build, path, sampler, expected, named):
         warnings.simplefilter("always")
         (mesh,) = load_meshes(path)
     assert mesh.emission.filter == expected
-    message = r"not honored: minFilter (magFilter counts at all distances) (materials[0].emissiveTexture)"
+    message = r"not honored: materials[0].emissiveTexture: minFilter (magFilter counts at all distances)"
     assert [message in str(entry.message) for entry in record] == [True] * named
 
 
@@ -758,7 +758,7 @@ def test_the_texture_of_a_thickness_is_named(build, path):
     volume = {"thicknessFactor": 1, "thicknessTexture": build.image(np.zeros((1, 1, 3), np.uint8))}
     extensions = {"KHR_materials_transmission": {"transmissionFactor": 1}, "KHR_materials_volume": volume}
     build.material(extensions=extensions).gltf(path)
-    with pytest.warns(UserWarning, match=r"not honored: thicknessTexture") as record:
+    with pytest.warns(UserWarning, match=r"not honored: .*: thicknessTexture") as record:
         load(path)
     assert len(record) == 1
 
@@ -896,7 +896,7 @@ def test_what_specular_glossiness_excludes_is_named(build, path):
     }
     build.json["extensionsRequired"] = ["KHR_materials_pbrSpecularGlossiness"]
     build.material(extensions=extensions, emissiveFactor=[1, 1, 1]).gltf(path)
-    message = r"not honored: KHR_materials_clearcoat beside KHR_materials_pbrSpecularGlossiness \(materials"
+    message = r"not honored: materials.*: KHR_materials_clearcoat beside KHR_materials_pbrSpecularGlossiness"
     with pytest.warns(UserWarning, match=message) as record:
         (mesh,) = load_meshes(path)
     assert len(record) == 1
@@ -1024,21 +1024,21 @@ def lose_of_material(named, **material):
         b.json["materials"] = [{"name": "m", **json.loads(text)}]
         b.json["meshes"][0]["primitives"][0]["material"] = 0
 
-    return lose, named + r" \(materials\[0\] 'm'\)"
+    return lose, r"materials\[0\] 'm': " + named
 
 
 @pytest.mark.filterwarnings("ignore:.*lacks? the texture coordinates")
 @pytest.mark.parametrize(
     ("lose", "message"),
     [
-        (lose_animation, r"animations \(the file\)"),
-        (lose_light, r"area light \(light 0\)"),
-        (lose_camera, r"further cameras \(cameras\[0\]\)"),
-        (lose_colors, r"COLOR_1 \(mesh 'mesh0'\)"),
-        (lose_targets, r"morph targets \(mesh 'mesh0'\)"),
-        (lose_lines, r"points and lines \(mesh 'mesh0'\)"),
-        (lose_skin, r"skin \(node 'arm'\)"),
-        (lose_range, r"range of a light \(light 0\)"),
+        (lose_animation, r"the file: animations"),
+        (lose_light, r"light 0: area light"),
+        (lose_camera, r"cameras\[0\]: further cameras"),
+        (lose_colors, r"mesh 'mesh0': COLOR_1"),
+        (lose_targets, r"mesh 'mesh0': morph targets"),
+        (lose_lines, r"mesh 'mesh0': points and lines"),
+        (lose_skin, r"node 'arm': skin"),
+        (lose_range, r"light 0: range of a light"),
         lose_of_material("occlusionTexture", occlusionTexture="image"),
         lose_of_material("ior 0", extensions={"KHR_materials_ior": {"ior": 0}}),
         lose_of_material(
@@ -1051,8 +1051,8 @@ def lose_of_material(named, **material):
         ),
         lose_of_material("dispersion", extensions={"KHR_materials_dispersion": {"dispersion": 1}}),
         lose_of_material("KHR_materials_unlit", extensions={"KHR_materials_unlit": {}}),
-        (lose_scene, r"further scenes \(the file\)"),
-        (lose_extension, r"KHR_materials_unknown \(the file\)"),
+        (lose_scene, r"the file: further scenes"),
+        (lose_extension, r"the file: KHR_materials_unknown"),
     ],
 )
 def test_what_is_not_honored_is_named(build, path, lose, message):
@@ -1150,7 +1150,7 @@ def test_vertex_colors_on_glass_are_named(build, path):
         extensions={"KHR_materials_transmission": {"transmissionFactor": 1}},
     )
     build.json["meshes"][0]["primitives"][0]["attributes"]["COLOR_0"] = build.accessor(COLORS)
-    with pytest.warns(UserWarning, match=r"not honored: vertex colors \(mesh 'mesh0'\)"):
+    with pytest.warns(UserWarning, match=r"not honored: mesh 'mesh0': vertex colors"):
         (mesh,) = load_meshes(build.gltf(path))
     assert isinstance(mesh.material.bsdf, ThinDielectric)
 
@@ -1187,7 +1187,7 @@ def test_a_third_set_of_texture_coordinates_is_named(build, path, extra):
     if extra == "attribute":
         third = build.accessor(TRIANGLE[:, :2])
         build.json["meshes"][0]["primitives"][0]["attributes"]["TEXCOORD_2"] = third
-    with pytest.warns(UserWarning, match=r"not honored: TEXCOORD_2 \(m"):
+    with pytest.warns(UserWarning, match=r"not honored: m.*: TEXCOORD_2"):
         load_meshes(build.gltf(path))
 
 
@@ -1329,7 +1329,7 @@ def test_a_missing_image_is_named_and_left_out(build, path):
         extensions=extensions,
     )
     build.gltf(path)
-    message = r"a\.gltf: not honored: texture 'my%20t\.png', which is missing \(images\[0\]\)"
+    message = r"a\.gltf: not honored: images\[0\]: texture 'my%20t\.png', which is missing"
     with pytest.warns(UserWarning, match=message) as record:
         (mesh,) = load(path).shapes
     assert len(record) == 1

@@ -20,6 +20,7 @@ import wavefront as wf
 from wavefront.codecs.images import write_image
 from wavefront.io import obj
 from wavefront.io.load import load_meshes
+from wavefront.io.losses import Losses
 from wavefront.io.sources import SceneFiles
 
 OBJ = "mtllib {library}\nv 0 0 0\nv 1 0 0\nv 0 1 0\nvt 0 0\nvt 1 0\nvt 0 1\nusemtl m\nf 1/1 2/2 3/3\n"
@@ -182,7 +183,7 @@ def test_many_materials_are_few_meshes_for_trimesh(calls_of: Callable[..., Any])
         order = corners[[0, 1, 2]] if width == 3 else corners[[0, 1, 2, 2, 3, 0]]
         expected[f"m{number}"] = (order.tolist(), textured)
     seen = calls_of("wavefront.io.obj.geometries")
-    raws = obj.parse("a.obj", "\n".join(text)).raws
+    raws = obj.parse(Losses("a.obj"), "\n".join(text)).raws
     assert len(seen[0].result) == 4
     assert [raw.name for raw in raws] == list(expected)
     for raw in raws:

@@ -1237,7 +1237,7 @@ def test_the_table_says_what_is_read(name: str, calls_of: Any, tmp_path: Path) -
 
 def test_what_the_table_does_not_say_cannot_be_read() -> None:
     with pytest.raises(KeyError, match="does not read"):
-        Node("sphere", "", "", {}, Losses()).get("softness")
+        Node("sphere", "", "", {}, Losses("")).get("softness")
 
 
 def test_the_documentation_lists_the_plugins() -> None:

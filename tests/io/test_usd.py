@@ -190,7 +190,7 @@ def test_textures(tmp_path: Path) -> None:
             (PAINT % (text, IMAGE)).replace("asset inputs:file = @a.png@", "odd inputs:file = 3") + BOUND,
         )
     (tmp_path / "a.png").unlink()
-    with pytest.warns(UserWarning, match=r"/paint/image the image 'a\.png', which is missing"):
+    with pytest.warns(UserWarning, match=r"/paint/image: the image 'a\.png', which is missing"):
         load(tmp_path, PAINT % (text, IMAGE) + BOUND, strict=False)
 
 
@@ -275,23 +275,23 @@ def test_the_first_coordinates_are_loaded_for_materials_without_textures(tmp_pat
 
 def test_primvars_that_are_missing_or_too_many_are_named(tmp_path: Path) -> None:
     base = ("color3f", "diffuseColor", "uv")
-    with pytest.raises(wf.SceneError, match="/board primvars:uv, which is missing; zeros in its place"):
+    with pytest.raises(wf.SceneError, match="/board: primvars:uv, which is missing; zeros in its place"):
         load(tmp_path, textured_board(tmp_path, base))
-    with pytest.warns(UserWarning, match="/board primvars:uv, which is missing"):
+    with pytest.warns(UserWarning, match="/board: primvars:uv, which is missing"):
         (mesh,) = load(tmp_path, textured_board(tmp_path, base), strict=False).shapes
     assert not mesh.uvs.any()
     three = [("float", name, name) for name in ("roughness", "metallic", "clearcoat")]
     extra = "".join(
         f'    texCoord2f[] primvars:{name} = [(0, 0)] (interpolation = "constant")\n' for _, name, _ in three
     )
-    with pytest.raises(wf.SceneError, match=r"/paint/r2 the primvar 'clearcoat'"):
+    with pytest.raises(wf.SceneError, match=r"/paint/r2: the primvar 'clearcoat'"):
         load(tmp_path, textured_board(tmp_path, *three, extra=extra))
-    with pytest.raises(wf.SceneError, match="/paint/r0 its varname, which is empty"):
+    with pytest.raises(wf.SceneError, match="/paint/r0: its varname, which is empty"):
         load(tmp_path, textured_board(tmp_path, ("float", "roughness", "")))
     narrow = '    float[] primvars:uv = [1, 2, 3, 4] (interpolation = "vertex")\n'
     with pytest.raises(wf.SceneError, match="/board: uv must have rows of 2 numbers"):
         load(tmp_path, textured_board(tmp_path, base, extra=narrow))
-    with pytest.raises(wf.SceneError, match="/paint/r0 the shader 'UsdPrimvarReader_int'"):
+    with pytest.raises(wf.SceneError, match="/paint/r0: the shader 'UsdPrimvarReader_int'"):
         load(tmp_path, textured_board(tmp_path, base).replace("Reader_float2", "Reader_int"))
 
 
@@ -378,7 +378,7 @@ def test_panels_may_be_stretched_and_balls_not(tmp_path: Path) -> None:
 """
     _, panel = load(tmp_path, MESH + body).shapes
     np.testing.assert_allclose(panel.vertices.max(0), [1, 1.5, 0])
-    with pytest.raises(wf.SceneError, match="/panel its stretch"):
+    with pytest.raises(wf.SceneError, match="/panel: its stretch"):
         load(tmp_path, MESH + body.replace("Rect", "Sphere"))
 
 
@@ -643,23 +643,23 @@ def test_what_is_hidden_is_left_out(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("body", "message"),
     [
-        (f'def BasisCurves "hair"\n{{\n}}\n{MESH}', "/hair a BasisCurves; left out"),
-        (MESH + 'def CylinderLight "l"\n{\n    bool treatAsLine = 1\n}\n', "/l treatAsLine"),
-        (PAINT % ("float inputs:displacement = 1", "") + BOUND, "/paint/shader displacement"),
-        (MESH + 'def SphereLight "l"\n{\n    float inputs:shaping:cone:angle = 9\n}\n', "/l its radius"),
+        (f'def BasisCurves "hair"\n{{\n}}\n{MESH}', "/hair: a BasisCurves; left out"),
+        (MESH + 'def CylinderLight "l"\n{\n    bool treatAsLine = 1\n}\n', "/l: treatAsLine"),
+        (PAINT % ("float inputs:displacement = 1", "") + BOUND, "/paint/shader: displacement"),
+        (MESH + 'def SphereLight "l"\n{\n    float inputs:shaping:cone:angle = 9\n}\n', "/l: its radius"),
         (
             MESH + 'def DiskLight "l"\n{\n    float inputs:shaping:cone:angle = 9\n}\n',
-            "/l inputs:shaping:cone",
+            "/l: inputs:shaping:cone",
         ),
         (
             MESH + 'def SphereLight "l"\n{\n    asset inputs:shaping:ies:file = @a.ies@\n}\n',
-            "/l inputs:shaping:ies:file",
+            "/l: inputs:shaping:ies:file",
         ),
-        (PAINT.replace("UsdPreviewSurface", "Other") % ("", "") + BOUND, "/paint its surface shader"),
-        (MESH.replace('"none"', '"catmullClark"'), "/board subdivisionScheme"),
+        (PAINT.replace("UsdPreviewSurface", "Other") % ("", "") + BOUND, "/paint: its surface shader"),
+        (MESH.replace('"none"', '"catmullClark"'), "/board: subdivisionScheme"),
         (
             MESH + 'def DomeLight "d"\n{\n    token inputs:texture:format = "angular"\n}\n',
-            "/d inputs:texture",
+            "/d: inputs:texture",
         ),
     ],
 )

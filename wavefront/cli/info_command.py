@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import argparse
 import os
-import warnings
 from collections.abc import Iterable, Iterator
 from typing import Any
 
@@ -13,6 +12,7 @@ import numpy as np
 from ..arrays.vec import Doubles
 from ..codecs.luminaires import EXTENSIONS as LUMINAIRES
 from ..codecs.luminaires import luminaire_texts, parsed_luminaire
+from ..core.errors import collect_warnings
 from ..core.parameter import brief
 from ..core.plural import plural
 from ..io.load import load
@@ -45,14 +45,14 @@ def add_info_command(commands: Any) -> None:
 
 def _info(options: argparse.Namespace) -> int:
     """Say what a scene file holds; return the exit status."""
-    with warnings.catch_warnings(record=True) as found:
-        warnings.simplefilter("always", UserWarning)
-        if options.scene.lower().endswith(LUMINAIRES):
-            lines = [_luminaire(options.scene)]
+    path = options.scene
+    with collect_warnings() as said:  # they are listed here
+        if path.lower().endswith(LUMINAIRES):
+            lines, losses = [_luminaire(path)], list(said)
         else:
-            scene = load(options.scene, progress=False if options.quiet else None, **reading(options))
-            lines = list(_lines(options.scene, scene))
-    print("\n".join([*lines, f"warnings: {len(found) or 'none'}", *(f"  {each.message}" for each in found)]))
+            scene = load(path, progress=False if options.quiet else None, **reading(options))
+            lines, losses = list(_lines(path, scene)), [each.said(path) for each in scene.losses]
+    print("\n".join([*lines, f"losses: {len(losses) or 'none'}", *(f"  {each}" for each in losses)]))
     return 0
 
 

@@ -18,7 +18,7 @@ from .suggestions import did_you_mean
 
 PACKAGE = os.path.join(os.path.dirname(os.path.dirname(__file__)), "")
 MOST_LETTERS = 120  # of a value in a message
-_collected: ContextVar[dict[str, None] | None] = ContextVar("collected", default=None)
+_listener: ContextVar[Callable[[str], None] | None] = ContextVar("listener", default=None)
 BEGIN, END = 1500, 500  # letters at both ends of a message that is kept where it is longer
 
 
@@ -142,9 +142,9 @@ def warn_caller(message: str) -> None:
 
     A warning that cannot be shown, as standard error is closed, is lost.
     """
-    collected = _collected.get()
-    if collected is not None:
-        collected[message] = None
+    listener = _listener.get()
+    if listener is not None:
+        listener(message)
         return
     frame, level = sys._getframe(1), 2
     while frame.f_back is not None and frame.f_code.co_filename.startswith(PACKAGE):
@@ -154,14 +154,21 @@ def warn_caller(message: str) -> None:
 
 
 @contextmanager
+def hear_warnings(listener: Callable[[str], None]) -> Iterator[None]:
+    """Give a function what `warn_caller` is given in this thread, in place of warnings."""
+    token = _listener.set(listener)
+    try:
+        yield
+    finally:
+        _listener.reset(token)
+
+
+@contextmanager
 def collect_warnings() -> Iterator[dict[str, None]]:
     """Collect what `warn_caller` is given in this thread, each message once, in place of warnings."""
     messages: dict[str, None] = {}
-    token = _collected.set(messages)
-    try:
+    with hear_warnings(lambda message: messages.update({message: None})):
         yield messages
-    finally:
-        _collected.reset(token)
 
 
 def in_brief(value: Any) -> str:

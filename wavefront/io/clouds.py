@@ -9,34 +9,26 @@ import numpy as np
 from ..core.plural import plural
 from ..shapes import Points, Spheres
 from ..shapes.points import usual_radius
-from .repair import Table, warn
+from .losses import Losses
+from .repair import Table
 
 
-def cloud(name: str, points: Table, colors: Any, strict: bool) -> Spheres | None:
-    """Return a sphere at each point (n, 3) of a file, and say so; None if there is none.
-
-    Raises
-    ------
-    SceneError
-        If `strict`, as this is a repair.
-    """
+def cloud(losses: Losses, points: Table, colors: Any) -> Spheres | None:
+    """Return a sphere at each point (n, 3) of a file, and note it; None if there is none."""
     sound = np.isfinite(points).all(1)
     if not sound.any():
         return None
     if not sound.all():
         lost = plural(int((~sound).sum()), "point")
-        warn(f"{name}: dropped {lost} not finite, first: point {np.argmin(sound)}", strict)
+        losses.note(f"{lost} not finite, first: point {np.argmin(sound)}", done="left out")
     places = points[sound]
     radius = usual_radius(places)
-    warn(
-        f"{name}: has no faces; {plural(len(places), 'point')} become spheres of radius {radius:.3g} "
-        "(wf.Points takes another)",
-        strict,
-    )
+    spheres = f"{plural(len(places), 'point')} become spheres of radius {radius:.3g}"
+    losses.note("has no faces", done=f"{spheres} (wf.Points takes another)")
     return Points(places, radius, None if colors is None else colors[sound])
 
 
-def cloud_of_trimesh(name: str, scene: Any, strict: bool) -> Spheres | None:
+def cloud_of_trimesh(losses: Losses, scene: Any) -> Spheres | None:
     """Return a sphere at each point of the clouds of a trimesh scene; None if there is none."""
     clouds = [each for each in scene.geometry.values() if type(each).__name__ == "PointCloud"]
     if not clouds:
@@ -44,4 +36,4 @@ def cloud_of_trimesh(name: str, scene: Any, strict: bool) -> Spheres | None:
     points = np.concatenate([np.asarray(each.vertices, np.float64).reshape(-1, 3) for each in clouds])
     colors = [np.asarray(each.colors) for each in clouds]
     whole = sum(map(len, colors)) == len(points) and all(each.dtype == np.uint8 for each in colors)
-    return cloud(name, points, np.concatenate(colors) if whole else None, strict)
+    return cloud(losses, points, np.concatenate(colors) if whole else None)

@@ -66,7 +66,7 @@ def check_included(place: str, files: SceneFiles, count: int, depth: int) -> Non
 class Part:
     """A part of a scene, such as a shape or a light, with its parameters."""
 
-    lost: Losses  # of all parts
+    lost: Losses  # of the load
     label: str  # where it is, and what, for messages
 
     def lose(self, what: str) -> None:
@@ -116,8 +116,6 @@ class Conversion(Generic[P]):
     files: SceneFiles
     find: Callable[[str], Path]  # the path of a file that the scene names
     read_mesh: Callable[[Path], list[RawMesh]]
-    strict: bool
-    lost: Losses = field(default_factory=Losses)
     made: dict[Any, Any] = field(default_factory=dict)  # what was converted already
     making: list[P] = field(default_factory=list)  # what refers to what is converted now
     triangles: int = 0

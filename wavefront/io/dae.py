@@ -11,7 +11,6 @@ from io import BytesIO
 from typing import Any
 
 from ..core.errors import SceneError
-from .repair import warn, warn_of_lost
 from .sources import SceneFiles
 from .trimesh_loading import Images, by_trimesh
 from .xml_checks import check_expanded, look_through, total
@@ -22,7 +21,7 @@ UP_AXIS = re.compile(rb"[^<>]*>\s*([XYZ])_UP")  # after the bytes "<" of an elem
 PLACES = ("node", "visual_scene", "scene")  # elements that hold nodes, or refer to them
 
 
-def parse(files: SceneFiles, data: bytes, strict: bool, materials: bool) -> tuple[Any, str]:
+def parse(files: SceneFiles, data: bytes, materials: bool) -> tuple[Any, str]:
     """Return the trimesh scene of a COLLADA file, and the axis that is up.
 
     Raises
@@ -37,19 +36,20 @@ def parse(files: SceneFiles, data: bytes, strict: bool, materials: bool) -> tupl
     check_expanded(name, document.children, document.sizes, "scene")
     images = Images(files)
     found = by_trimesh(name, data, "dae", images)
-    lost = [f"{tag} (line {line})" for tag, line in document.lost.items()]
-    if any(map(_is_clear, found.geometry.values())):
-        lost.append("opacity of materials")
-    warn_of_lost(name, lost if materials else (), strict)
     if materials:
-        images.report(strict)
+        for tag, line in document.lost.items():
+            files.losses.note(tag, f"line {line}")
+        if any(map(_is_clear, found.geometry.values())):
+            files.losses.note("opacity of materials")
+        images.report()
     # pycollada drops damaged parts without a warning
     there = total(name, document.children, lambda node: document.primitives.get(node, 0), "scene")
     absent = there - len(found.graph.nodes_geometry)
     if there and absent == there:
         raise SceneError(f"{name}: not a readable dae file: all parts of its geometry are damaged")
     if absent > 0:
-        warn(f"{name}: left out {absent} of {there} parts of its geometry, which are damaged", strict)
+        damaged = f"{absent} of {there} parts of its geometry"
+        files.losses.note(damaged, value="damaged", done="left out")
     return found, document.up
 
 

@@ -16,6 +16,7 @@ from ..shapes.smoothing import AUTO, check_smooth
 from .appearance import assign_material
 from .clouds import cloud
 from .contents import Contents
+from .losses import Losses
 from .repair import RawMesh, Table, build, with_face_colors
 
 LINE = 0.0025  # radius of lines, in parts of the diagonal of all
@@ -170,7 +171,8 @@ def _opaque(colors: Any) -> Table:
 def _built(raw: RawMesh, smooth: bool | float | str) -> list[Shape]:
     Contents.once([raw]).smooth(check_smooth("smooth", smooth))
     assign_material(raw, None)
-    mesh = build(raw.name, raw)
+    with Losses(raw.name) as losses:
+        mesh = build(raw.name, raw, losses)
     if mesh is None:
         raise SceneError(f"{raw.name}: has no faces")
     return [mesh]
@@ -182,7 +184,8 @@ def _spheres(name: str, points: Table, colors: Any) -> list[Shape]:
         if colors is None
         else _opaque(srgb(colors if colors.dtype.kind == "u" else np.clip(colors, 0, 1)))
     )
-    found = cloud(name, points, linear, strict=False)
+    with Losses(name) as losses:
+        found = cloud(losses, points, linear)
     if found is None:
         raise SceneError(f"{name}: has no points")
     return [found]

@@ -62,7 +62,6 @@ class Document:
         self._buffers: dict[int, bytes] = {}
         self._files: dict[str, bytes] = {}
         self._numbers = 0  # numbers that were read from accessors
-        self.lost: dict[str, str] = {}  # property that is not honored -> its first place
 
     @contextmanager
     def inside(self, element: str) -> Iterator[None]:
@@ -85,8 +84,8 @@ class Document:
             ) from error
 
     def lose(self, what: str, where: str) -> None:
-        """Record a property that is not honored."""
-        self.lost.setdefault(what, where)
+        """Note a property that is not honored."""
+        self.files.losses.note(what, where)
 
     def get(self, kind: str, index: Any) -> dict[str, Any]:
         """Return element `index` of the array `kind`."""

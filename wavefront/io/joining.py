@@ -11,6 +11,7 @@ from ..arrays.vec import Doubles
 from ..core.errors import SceneError, finite_array
 from ..materials import MaterialLike, as_material
 from ..shapes import Mesh
+from .losses import Losses
 from .placing import moved_raw
 from .repair import RawMesh, build
 
@@ -47,7 +48,8 @@ def join(
         glow = meshes[0].emission
         raw.emission = glow[:, 0] if isinstance(glow, np.ndarray) else glow
         raw.two_sided = meshes[0].two_sided
-    mesh = build(name, raw)
+    with Losses(name) as losses:
+        mesh = build(name, raw, losses)
     if mesh is None:
         raise SceneError(f"{name}: transform leaves no face with an area")
     return mesh

@@ -20,6 +20,7 @@ from ..shapes import Instance, Mesh, Shape
 from ..shapes.smoothing import AUTO, check_smooth
 from . import trimesh_objects, trimesh_view
 from .joining import join
+from .losses import Losses
 from .placing import place_meshes, place_shapes
 from .readers import LoadOptions, mesh_reader, read
 from .sources import LoadLimits, PathLike, SceneFiles, checked_limits, folders
@@ -78,9 +79,9 @@ def load(
     >>> len(scene.shapes[0].faces)
     1
     """
-    with _reading(path, progress):
+    with Losses(path_name(path), strict) as losses, _reading(path, progress):
         options = LoadOptions(
-            strict,
+            losses,
             limits=checked_limits(limits),
             search_paths=folders(search_paths),
             smooth=check_smooth("smooth", smooth),
@@ -88,9 +89,9 @@ def load(
             time=None if time is None else number("time", time),
         )
         name, contents = path_name(path), read(path, options)
-        placed = place_shapes(name, contents.raws, contents.places, strict)
+        placed = place_shapes(name, contents.raws, contents.places, losses)
         shapes = _some(name, [*placed, *contents.shapes])
-        return Scene(
+        scene = Scene(
             shapes,
             contents.lights,
             contents.camera,
@@ -98,6 +99,8 @@ def load(
             settings=contents.settings,
             medium=contents.medium,
         )
+        scene.losses = losses.found
+        return scene
 
 
 def load_mesh(
@@ -138,15 +141,15 @@ def load_mesh(
     >>> mesh.vertices.shape
     (3, 3)
     """
-    with _reading(path, progress):
-        meshes = load_meshes(
-            path,
-            strict=strict,
-            materials=material is None,
-            limits=limits,
-            search_paths=search_paths,
-            smooth=smooth,
+    with Losses(path_name(path), strict) as losses, _reading(path, progress):
+        options = LoadOptions(
+            losses,
+            material is None,
+            checked_limits(limits),
+            folders(search_paths),
+            check_smooth("smooth", smooth),
         )
+        meshes = _meshes(path, options)
         return join(meshes, Path(path).stem, material, transform)
 
 
@@ -160,11 +163,16 @@ def load_meshes(
     smooth: bool | float | str = AUTO,
 ) -> list[Mesh]:
     """Read the meshes of a file, one for each material and node; arguments as for `load`."""
-    options = LoadOptions(
-        strict, materials, checked_limits(limits), folders(search_paths), check_smooth("smooth", smooth)
-    )
+    with Losses(path_name(path), strict) as losses:
+        options = LoadOptions(
+            losses, materials, checked_limits(limits), folders(search_paths), check_smooth("smooth", smooth)
+        )
+        return _meshes(path, options)
+
+
+def _meshes(path: PathLike, options: LoadOptions) -> list[Mesh]:
     name, contents = path_name(path), read(path, options)
-    placed = place_meshes(name, contents.raws, contents.places, strict)
+    placed = place_meshes(name, contents.raws, contents.places, options.losses)
     return _some(name, [*placed, *(_as_mesh(name, shape) for shape in contents.shapes)])
 
 
@@ -219,12 +227,14 @@ def from_trimesh(geometry: Any, *, smooth: bool | float | str = AUTO) -> Scene:
            [ 0.5,  0.5,  0.5]])
     """
     source = "trimesh object"
-    contents = trimesh_objects.read(geometry, source, strict=False)
-    contents.smooth(check_smooth("smooth", smooth))
-    shapes = _some(source, place_shapes(source, contents.raws, contents.places, strict=False))
-    scene = Scene(shapes, trimesh_view.lights(geometry), up=contents.up)
-    trimesh_view.add_camera(scene, geometry)
-    return scene
+    with Losses(source) as losses:
+        contents = trimesh_objects.read(geometry, source, losses)
+        contents.smooth(check_smooth("smooth", smooth))
+        shapes = _some(source, place_shapes(source, contents.raws, contents.places, losses))
+        scene = Scene(shapes, trimesh_view.lights(geometry), up=contents.up)
+        trimesh_view.add_camera(scene, geometry)
+        scene.losses = losses.found
+        return scene
 
 
 def from_mitsuba(
@@ -263,8 +273,11 @@ def from_mitsuba(
     from .mitsuba.convert import convert  # here, as programs that read no such scene need not pay for it
 
     name = "Mitsuba scene"
-    files = SceneFiles(name, (), checked_limits(limits))
-    return convert(name, scene, files, Path, mesh_reader(files, strict), strict)
+    with Losses(name, strict) as losses:
+        files = SceneFiles(name, (), checked_limits(limits), losses)
+        made = convert(name, scene, files, Path, mesh_reader(files))
+        made.losses = losses.found
+        return made
 
 
 def _some(name: str, shapes: list[T]) -> list[T]:

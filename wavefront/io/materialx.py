@@ -7,21 +7,20 @@ brings, glTF's by a table. Graphs of constants and images are evaluated; of othe
 from __future__ import annotations
 
 import operator
-import warnings
 from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
 
 from ..arrays.vec import f4
-from ..core.errors import SceneError
+from ..core.errors import SceneError, hear_warnings
 from ..core.files import path_name
 from ..materials import Material, OpenPBR
 from ..textures.base import BaseTexture
 from ..textures.image import Texture
 from ..textures.normal_map import NormalMap
+from .losses import Losses
 from .pbrt.textures import computed
-from .repair import warn
 from .sources import LoadLimits, PathLike, SceneFiles, checked_limits, folders
 from .xml_checks import look_through
 
@@ -156,14 +155,19 @@ def load_materialx(
     >>> if find_spec("MaterialX"):
     ...     ball = wf.Sphere((0, 0, 0), 1, material=wf.load_materialx("clay.mtlx")["clay"])
     """
-    name, files = path_name(path), SceneFiles(path, folders(search_paths), checked_limits(limits))
+    with Losses(path_name(path), strict) as losses:
+        return _materials(SceneFiles(path, folders(search_paths), checked_limits(limits), losses))
+
+
+def _materials(files: SceneFiles) -> dict[str, Material]:
+    name = files.name
     try:
         import MaterialX
     except ImportError as error:
         raise ImportError("MaterialX documents need materialx: pip install materialx") from error
-    data, lost = files.read(path), dict[str, None]()
-    _check(name, data, lost)
-    document = _Document(MaterialX, name, data, files, lost)
+    data = files.read(name)
+    _check(name, data, files.losses)
+    document = _Document(MaterialX, name, data, files)
     try:
         materials = {node.getName(): document.material(node) for node in document.materials()}
     except SceneError as error:
@@ -171,13 +175,12 @@ def load_materialx(
     except (RuntimeError, TypeError, UnicodeDecodeError, LookupError) as error:  # of the library
         raise SceneError(f"{name}: not a readable MaterialX document: {error}") from error
     if not materials:
+        lost = [each.part for each in files.losses.found]
         raise SceneError(f"{name}: has no materials{'; not followed: ' * bool(lost)}{'; '.join(lost)}")
-    if lost:
-        warn(f"{name}: not honored: {'; '.join(lost)}", strict)
     return materials
 
 
-def _check(name: str, data: bytes, lost: dict[str, None]) -> None:
+def _check(name: str, data: bytes, losses: Losses) -> None:
     """Refuse what is no MaterialX document before the library reads it."""
     depth = 0
 
@@ -189,7 +192,7 @@ def _check(name: str, data: bytes, lost: dict[str, None]) -> None:
         if depth > MAX_DEPTH:
             raise SceneError(f"{name}: its elements are nested deeper than {MAX_DEPTH}")
         if tag == "include":
-            lost[f"the include of {attributes.get('href', '')!r}"] = None
+            losses.note(f"the include of {attributes.get('href', '')!r}")
 
     def end(tag: str, at: int) -> None:
         nonlocal depth
@@ -201,10 +204,8 @@ def _check(name: str, data: bytes, lost: dict[str, None]) -> None:
 class _Document:
     """A document of the library, and the conversion of its materials."""
 
-    def __init__(
-        self, library: Any, name: str, data: bytes, files: SceneFiles, lost: dict[str, None]
-    ) -> None:
-        self.library, self.name, self.files, self.lost = library, name, files, lost
+    def __init__(self, library: Any, name: str, data: bytes, files: SceneFiles) -> None:
+        self.library, self.name, self.files = library, name, files
         self.standard = library.createDocument()
         folder = library.getDefaultDataSearchPath()
         library.loadLibraries(library.getDefaultDataLibraryFolders(), folder, self.standard)
@@ -255,14 +256,11 @@ class _Document:
             given["specular_ior"] = max(float(given["specular_ior"]), LEAST_INDEX)
         if "geometry_thin_walled" in given:
             given["geometry_thin_walled"] = bool(given["geometry_thin_walled"])
-        with warnings.catch_warnings(record=True) as said:
-            warnings.simplefilter("always")
-            try:
-                made = OpenPBR(**given, name=title)
-            except SceneError as error:
-                raise SceneError(f"{self.name}: material {title!r}: {error}") from error
-        self.lost.update(dict.fromkeys(f"{title}: {each.message}" for each in said))
-        return made
+        try:
+            with hear_warnings(lambda message: self.files.losses.note(message, title, done="")):
+                return OpenPBR(**given, name=title)
+        except SceneError as error:
+            raise SceneError(f"{self.name}: material {title!r}: {error}") from error
 
     def _translated(self, title: str, inputs: dict[str, Value]) -> dict[str, Value]:
         """Return the inputs of OpenPBR for those of standard surface, by the library's graph."""
@@ -413,7 +411,7 @@ class _Document:
         return NormalMap(image, float(scale[0]))
 
     def _lose(self, material: str, name: str, what: str) -> None:
-        self.lost[f"{material}: {name}{f' by {what}' if what else ''}"] = None
+        self.files.losses.note(f"{name}{f' by {what}' if what else ''}", material)
 
 
 def _plain(given: Any) -> Value:

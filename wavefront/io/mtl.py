@@ -49,7 +49,7 @@ from ..textures.image import StoredImage, Texture
 from ..textures.normal_map import BaseNormalMap, BumpMap, NormalMap
 from ..textures.parameter import MAX_INDEX
 from .appearance import MaterialSpec, build_material
-from .repair import warn, warn_of_lost
+from .losses import Losses
 from .sources import SceneFiles
 
 # values of `illum`
@@ -96,12 +96,17 @@ class Entry:
     idle_options: set[str] = field(default_factory=set)  # options of maps that are not honored
     images: dict[str, NDArray[np.uint8]] = field(default_factory=dict)  # maps that were read already
     files: SceneFiles | None = None  # None where all maps were read already
-    strict: bool = False
+    losses: Losses = field(default_factory=lambda: Losses(""))
 
     def where(self, key: str) -> str:
         """Return file, line (if there is one) and keyword for a message."""
         keyword, number, _ = self.lines[key]
         return f"{self.file} line {number}: {keyword}" if number else f"{self.file}: {keyword}"
+
+    def note(self, key: str, value: str, done: str) -> None:
+        """Note the value of a line that is changed or left out."""
+        place, _, keyword = self.where(key).rpartition(": ")
+        self.losses.note(keyword, place, value, done)
 
     def has(self, *keys: str) -> bool:
         """Return whether any of the keywords occurs."""
@@ -137,9 +142,7 @@ class Entry:
         limited = np.clip(color, 0, high)
         if (limited != color).any():
             limit = f"in [0, {high:g}]" if np.isfinite(high) else "at least 0"
-            warn(
-                f"{self.where(key)} is {self.lines[key][2]}; it must be {limit} and was clamped", self.strict
-            )
+            self.note(key, self.lines[key][2], f"clamped, as it must be {limit}")
         return limited
 
     def texture(self, key: str, scale: Any = 1.0, kind: str = "color") -> Texture | None:
@@ -233,7 +236,7 @@ def _spellings(value: float) -> set[str]:
 
 
 def parse(
-    path: str | os.PathLike[str], text: str, strict: bool = False, files: SceneFiles | None = None
+    path: str | os.PathLike[str], text: str, losses: Losses, files: SceneFiles | None = None
 ) -> dict[str, Entry]:
     """Split MTL text into materials; a name may contain spaces. Their maps are among `files`.
 
@@ -250,7 +253,7 @@ def parse(
         if not keyword:
             continue
         if key == "newmtl":
-            current = entries[rest] = Entry(file, rest, strict=strict, files=files)
+            current = entries[rest] = Entry(file, rest, losses=losses, files=files)
         elif current is None:
             raise SceneError(f"{file} line {number}: {keyword} stands before the first newmtl")
         else:
@@ -265,13 +268,13 @@ def _split(line: str) -> tuple[str, str]:
     return words[0], words[1].strip() if len(words) > 1 else ""
 
 
-def specs(entries: dict[str, Entry], strict: bool = False) -> dict[str, MaterialSpec]:
-    """Convert entries to materials; unsupported properties are named in one warning.
+def specs(entries: dict[str, Entry], losses: Losses) -> dict[str, MaterialSpec]:
+    """Convert entries to materials; unsupported properties are noted.
 
     Raises
     ------
     SceneError
-        If a value is malformed, or `strict` and one is out of range or not honored.
+        If a value is malformed.
     """
     out: dict[str, MaterialSpec] = {}
     unread: dict[str, str] = {}
@@ -281,7 +284,8 @@ def specs(entries: dict[str, Entry], strict: bool = False) -> dict[str, Material
         for keyword in (*entry.unread(), *sorted(entry.idle_options), *out[name].lost):
             unread.setdefault(keyword, name)
     file = next((entry.file for entry in entries.values()), "")
-    warn_of_lost(file, (f"{keyword} (material {name!r})" for keyword, name in unread.items()), strict)
+    for keyword, name in unread.items():
+        losses.note(keyword, f"{file}, material {name!r}")
     return out
 
 
@@ -303,7 +307,7 @@ def _leave_out_missing(entry: Entry) -> None:
     for key in [key for key in entry.lines if key in MAPS and key not in entry.images]:
         name = _map(entry, key)[1]
         if name and not os.path.exists(entry.find(key, name)):
-            warn(f"{entry.where(key)}: texture {name!r} is missing", entry.strict)
+            entry.losses.note(f"texture {name!r}", entry.where(key), "missing", "left out")
             del entry.lines[key]
 
 
@@ -352,7 +356,7 @@ def _exponent(entry: Entry) -> float:
     """Return `Ns`, clamped to [0, `LARGEST_NS`]: larger values do not sharpen the highlight."""
     value = entry.number("ns", 0.0)
     if value < 0:
-        warn(f"{entry.where('ns')} is {value:g}; it must be at least 0 and was clamped", entry.strict)
+        entry.note("ns", f"{value:g}", "clamped, as it must be at least 0")
     return min(max(value, 0.0), LARGEST_NS)
 
 
@@ -448,7 +452,7 @@ def _part(entry: Entry, key: str, default: float) -> float:
     """Return a number in [0, 1], clamped with a warning."""
     value = entry.number(key, default)
     if not 0 <= value <= 1:
-        warn(f"{entry.where(key)} is {value:g}; it must be in [0, 1] and was clamped", entry.strict)
+        entry.note(key, f"{value:g}", "clamped, as it must be in [0, 1]")
     return min(max(value, 0.0), 1.0)
 
 

@@ -21,7 +21,8 @@ import numpy as np
 
 from ..arrays.vec import Ints
 from ..core.errors import SceneError
-from .repair import RawMesh, Table, warn
+from .losses import Losses
+from .repair import RawMesh, Table
 from .sources import LoadLimits
 from .text_lines import NUMBER, check_lines, words
 from .trimesh_import import import_trimesh
@@ -80,15 +81,15 @@ class _Lines:
     absent: dict[str, str] = field(default_factory=dict)  # keyword that only faces use -> message
 
 
-def parse(name: str, text: str, strict: bool = False, limits: LoadLimits | None = None) -> Obj:
-    """Read OBJ text; `name` is for messages.
+def parse(losses: Losses, text: str, limits: LoadLimits | None = None) -> Obj:
+    """Read OBJ text.
 
     Raises
     ------
     SceneError
         If a line is malformed. The message names the file, the line, its text and what is allowed.
     """
-    texts = _clean(text)
+    name, texts = losses.name, _clean(text)
     lines, out, smooth = _Lines(name, texts, check_lines(texts, partial(_check, name))), Obj(), []
     material = ""
     for at, (keyword, width, _) in enumerate(lines.kinds):
@@ -118,7 +119,7 @@ def parse(name: str, text: str, strict: bool = False, limits: LoadLimits | None 
     faces = [line for number, each in enumerate(classes) for line in (f"usemtl {number}", *each.faces)]
     meshes = geometries(name, "obj", "\n".join(_tables(lines) + added + faces).encode())
     for message in lines.absent.values():
-        warn(message, strict)
+        losses.hear(message)
     # trimesh lists the last mesh first
     raws = {
         raw.name: raw

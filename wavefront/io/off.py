@@ -7,13 +7,13 @@ from typing import Any
 from ..core.errors import SceneError
 from ..core.files import decode_text
 from ..core.plural import plural
-from .repair import warn_of_lost
+from .losses import Losses
 from .trimesh_loading import by_trimesh
 
 HEADERS = {"OFF": [], "COFF": ["colors of vertices"], "NOFF": ["normals"], "STOFF": ["texture coordinates"]}
 
 
-def parse(name: str, data: bytes, strict: bool, materials: bool) -> Any:
+def parse(losses: Losses, data: bytes, materials: bool) -> Any:
     """Return the trimesh scene of an OFF file.
 
     Raises
@@ -21,6 +21,7 @@ def parse(name: str, data: bytes, strict: bool, materials: bool) -> Any:
     SceneError
         If a line is malformed. The message names the file and the line.
     """
+    name = losses.name
     lines = [line.partition("#")[0].split() for line in decode_text(data).split("\n")]
     rows = [(number, words) for number, words in enumerate(lines, 1) if words]
     first = rows[0][1][0].upper() if rows else ""
@@ -42,7 +43,8 @@ def parse(name: str, data: bytes, strict: bool, materials: bool) -> Any:
     lost = list(HEADERS[header])
     if any(len(words) > int(words[0]) + 1 for _, words in rows[vertices : vertices + faces]):
         lost.append("colors of faces")
-    warn_of_lost(name, lost if materials else (), strict)
+    for each in lost if materials else ():
+        losses.note(each)
     # only the counts and the rows that they cover: trimesh would also read the lines after them
     text = [f"OFF\n{vertices} {faces} 0", *(" ".join(words) for _, words in rows[: vertices + faces])]
     return by_trimesh(name, "\n".join(text).encode(), "off")

@@ -11,6 +11,7 @@ from ..core.errors import SceneError
 from ..shapes import Instance, Mesh
 from ..shapes.instance import can_place
 from ..shapes.transform import Matrix, moved, moved_tangents
+from .losses import Losses
 from .repair import RawMesh, build
 
 MAX_ELEMENT = 1e100  # of a matrix: the squares of larger elements overflow
@@ -33,7 +34,7 @@ class Places:
         return cls(np.arange(count), np.tile(np.eye(4), (count, 1, 1)))
 
 
-def place_shapes(name: str, raws: list[RawMesh], places: Places, strict: bool) -> list[Mesh | Instance]:
+def place_shapes(name: str, raws: list[RawMesh], places: Places, losses: Losses) -> list[Mesh | Instance]:
     """Build meshes, and an instance for each placement of a mesh with several.
 
     Parameters
@@ -44,7 +45,7 @@ def place_shapes(name: str, raws: list[RawMesh], places: Places, strict: bool) -
         The distinct meshes.
     places
         Their placements.
-    strict
+    losses
         As for `build`.
 
     Raises
@@ -58,9 +59,9 @@ def place_shapes(name: str, raws: list[RawMesh], places: Places, strict: bool) -
     for raw, at in _by_mesh(raws, places):
         matrices = places.matrix[at]
         if len(at) == 1:
-            shapes[at[0]] = build(name, moved_raw(raw, matrices[0]), strict)
+            shapes[at[0]] = build(name, moved_raw(raw, matrices[0]), losses)
             continue
-        mesh = build(name, raw, strict)
+        mesh = build(name, raw, losses)
         if mesh is None:
             continue
         fit = can_place(mesh, matrices)
@@ -74,14 +75,14 @@ def place_shapes(name: str, raws: list[RawMesh], places: Places, strict: bool) -
                 f"the limit is {MAX_COPIES}"
             )
         for i in at[~fit].tolist():
-            shapes[i] = build(name, moved_raw(raw, places.matrix[i]), strict)
+            shapes[i] = build(name, moved_raw(raw, places.matrix[i]), losses)
     for shape, own in zip(shapes, places.names or (), strict=False):
         if shape is not None and own:
             shape.name = own
     return [shape for shape in shapes if shape is not None]
 
 
-def place_meshes(name: str, raws: list[RawMesh], places: Places, strict: bool) -> list[Mesh]:
+def place_meshes(name: str, raws: list[RawMesh], places: Places, losses: Losses) -> list[Mesh]:
     """Build a mesh for each placement; arguments and errors as of `place_shapes`."""
     _check_range(name, raws, places)
     sizes = np.array([len(raw.faces) for raw in raws], np.int64)
@@ -92,7 +93,7 @@ def place_meshes(name: str, raws: list[RawMesh], places: Places, strict: bool) -
             f"its meshes {sizes.sum()}; as meshes of their own, at most {MAX_COPIED_FACES} are copied"
         )
     parts = zip(places.raw.tolist(), places.matrix, strict=True)
-    built = (build(name, moved_raw(raws[number], matrix), strict) for number, matrix in parts)
+    built = (build(name, moved_raw(raws[number], matrix), losses) for number, matrix in parts)
     return [mesh for mesh in built if mesh is not None]
 
 

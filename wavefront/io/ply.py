@@ -17,7 +17,6 @@ from numpy.typing import NDArray
 from ..core.errors import SceneError
 from ..core.plural import plural
 from .ply_header import SIZES, TYPES, Element, check_ply, ply_textures, unread
-from .repair import warn, warn_of_lost
 from .sources import SceneFiles
 from .trimesh_import import import_trimesh
 from .trimesh_loading import Images, by_trimesh
@@ -26,7 +25,7 @@ FACES = ("face", "tristrips")
 ORDERS: dict[str, Literal["little", "big"]] = {"<": "little", ">": "big"}
 
 
-def parse(files: SceneFiles, data: bytes, strict: bool, materials: bool) -> tuple[Any, int]:
+def parse(files: SceneFiles, data: bytes, materials: bool) -> tuple[Any, int]:
     """Return the trimesh object of a PLY file, and the number of its faces by the header.
 
     Raises
@@ -41,13 +40,14 @@ def parse(files: SceneFiles, data: bytes, strict: bool, materials: bool) -> tupl
     if faces is not None:
         lost += [f"{what} of {faces.name}" for what in faces.properties if not what.startswith("vertex_ind")]
         elements = [faces]
-    warn_of_lost(name, dict.fromkeys(lost) if materials else (), strict)
+    for each in lost if materials else ():
+        files.losses.note(each)
     textures = ply_textures(data)
     if len(textures) > 1 and materials:
-        warn(f"{name}: not honored: several textures; {textures[-1]!r} is taken for all faces", strict)
+        files.losses.note("several textures", done=f"{textures[-1]!r} is taken for all faces")
     images = Images(files)
     found = by_trimesh(name, data, "ply", images, skip_materials=not (textures and materials))
-    images.report(strict)
+    images.report()
     return found, sum(element.count for element in elements if element.name == "face")
 
 

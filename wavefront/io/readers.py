@@ -19,8 +19,9 @@ from .appearance import MaterialSpec, assign_material, from_srgb
 from .clouds import cloud, cloud_of_trimesh
 from .contents import Contents
 from .gltf_materials import GltfMaterials
+from .losses import Losses
 from .placing import Places
-from .repair import RawMesh, warn, warn_of_lost
+from .repair import RawMesh
 from .sources import LoadLimits, PathLike, SceneFiles
 
 
@@ -28,7 +29,7 @@ from .sources import LoadLimits, PathLike, SceneFiles
 class LoadOptions:
     """Options of reading a file."""
 
-    strict: bool = False  # refuse files that need a repair or have unsupported properties
+    losses: Losses  # where what is damaged, unknown or not supported is noted
     materials: bool = True  # read materials
     limits: LoadLimits = field(default_factory=LoadLimits)
     search_paths: tuple[Path, ...] = ()  # folders whose files the file may refer to, beside its own
@@ -50,7 +51,7 @@ def read(path: PathLike, options: LoadOptions) -> Contents:
     parse = READERS.find(kind, f"{name}: extension")
     if options.parameters and kind != ".xml":
         raise SceneError(f"{name}: parameters are for .xml files")
-    files = SceneFiles(path, options.search_paths, options.limits)
+    files = SceneFiles(path, options.search_paths, options.limits, options.losses)
     data = files.read(path)
     if kind in PLAIN:
         _refuse(name, data)
@@ -78,78 +79,76 @@ def _read_gltf(files: SceneFiles, data: bytes, options: LoadOptions) -> Contents
             # without a material, the mesh gets the default material, as in memory
             if options.materials and not assign_material(raw, None if number is None else specs.spec(number)):
                 document.lose("vertex colors", f"mesh {raw.name!r}")
-    if options.materials:
-        lost = (f"{what} ({where})" for what, where in document.lost.items())
-        warn_of_lost(document.name, lost, options.strict)
     raws = [raw for raw, _ in found.raws]
     return Contents(raws, found.places, found.lights, found.camera, flat=True)
 
 
 def _read_obj(files: SceneFiles, data: bytes, options: LoadOptions) -> Contents:
-    name, strict, materials = files.name, options.strict, options.materials
-    parsed = obj.parse(name, decode_text(data), strict, options.limits)
-    warn_of_lost(name, (f"{keyword} (line {line})" for keyword, line in parsed.ignored.items()), strict)
+    losses, materials = files.losses, options.materials
+    parsed = obj.parse(losses, decode_text(data), options.limits)
+    for keyword, line in parsed.ignored.items():
+        losses.note(keyword, f"line {line}")
     if parsed.points is not None:
         codes = None if parsed.points.shape[1] < 6 else from_srgb(parsed.points[:, 3:])
-        points = cloud(name, parsed.points[:, :3], codes, strict)
+        points = cloud(losses, parsed.points[:, :3], codes)
         return Contents([], Places.once(0), shapes=[] if points is None else [points])
-    specs = _libraries(files, parsed.libraries, strict) if materials else {}
+    specs = _libraries(files, parsed.libraries) if materials else {}
     for raw in parsed.raws:
         raw.colors = None if raw.colors is None else from_srgb(raw.colors)
         if materials and not assign_material(raw, specs.get(raw.name)):
-            warn(f"{name}: not honored: vertex colors (material {raw.name!r})", strict)
+            losses.note("vertex colors", f"material {raw.name!r}")
     absent = ", ".join(repr(raw.name) for raw in parsed.raws if raw.name and raw.name not in specs)
     if specs and absent:
-        warn(f"{name}: not in its material files: {absent}", strict)
+        losses.note(f"not in its material files: {absent}", done="gray in their place")
     if materials and absent and not parsed.libraries:
-        warn(f"{name}: names no material file for its materials {absent}", strict)
+        losses.note(f"names no material file for its materials {absent}", done="gray in their place")
     return Contents.once(parsed.raws)
 
 
-def _libraries(files: SceneFiles, libraries: list[str], strict: bool) -> dict[str, MaterialSpec]:
-    """Read the material files; warn of missing ones."""
+def _libraries(files: SceneFiles, libraries: list[str]) -> dict[str, MaterialSpec]:
+    """Read the material files; note missing ones."""
     specs: dict[str, MaterialSpec] = {}
     for library in dict.fromkeys(libraries):
         file = files.find(library)
         if not os.path.exists(file):  # also False for invalid names
-            warn(f"{files.name}: material file {library!r} is missing", strict)
+            files.losses.note(f"material file {library!r}", value="missing", done="left out")
             continue
-        entries = mtl.parse(file, decode_text(files.read(file)), strict, files)
-        specs.update(mtl.specs(entries, strict))
+        entries = mtl.parse(file, decode_text(files.read(file)), files.losses, files)
+        specs.update(mtl.specs(entries, files.losses))
     return specs
 
 
 def _read_ply(files: SceneFiles, data: bytes, options: LoadOptions) -> Contents:
     name = files.name
-    found, claimed = ply.parse(files, data, options.strict, options.materials)
-    contents = trimesh_objects.read(found, name, options.strict)
+    found, claimed = ply.parse(files, data, options.materials)
+    contents = trimesh_objects.read(found, name, files.losses)
     faces = sum(len(raw.faces) for raw in contents.raws)
     if faces < claimed:
         raise SceneError(f"{name}: claims {plural(claimed, 'row')} of face; {faces} can be read")
-    points = cloud_of_trimesh(name, found, options.strict) if not faces else None
+    points = cloud_of_trimesh(files.losses, found) if not faces else None
     return contents if points is None else replace(contents, shapes=[points])
 
 
 def _read_stl(files: SceneFiles, data: bytes, options: LoadOptions) -> Contents:
-    contents = Contents.once(stl.parse(files.name, data, options.strict))
+    contents = Contents.once(stl.parse(files.losses, data))
     contents.up = "z"
     return contents
 
 
 def _read_off(files: SceneFiles, data: bytes, options: LoadOptions) -> Contents:
-    found = off.parse(files.name, data, options.strict, options.materials)
-    return trimesh_objects.read(found, files.name, options.strict)
+    found = off.parse(files.losses, data, options.materials)
+    return trimesh_objects.read(found, files.name, files.losses)
 
 
 def _read_dae(files: SceneFiles, data: bytes, options: LoadOptions) -> Contents:
-    found, up = dae.parse(files, data, options.strict, options.materials)
-    contents = trimesh_objects.read(found, files.name, options.strict)
+    found, up = dae.parse(files, data, options.materials)
+    contents = trimesh_objects.read(found, files.name, files.losses)
     contents.up = up
     return contents
 
 
 def _read_3mf(files: SceneFiles, data: bytes, options: LoadOptions) -> Contents:
-    contents = threemf.parse(files, data, options.strict, options.materials)
+    contents = threemf.parse(files, data, options.materials)
     contents.up = "z"
     return contents
 
@@ -160,16 +159,13 @@ def _read_mitsuba(files: SceneFiles, data: bytes, options: LoadOptions) -> Conte
 
     name = files.name
     document = Document(files, data, options.parameters)
-    scene = convert(
-        name, document.scene, files, document.find, mesh_reader(files, options.strict), options.strict
-    )
-    return _contents(scene)
+    return _contents(convert(name, document.scene, files, document.find, mesh_reader(files)))
 
 
 def _read_usd(files: SceneFiles, data: bytes, options: LoadOptions) -> Contents:
     from .usd.stage import read_usd  # here, as programs that read no such scene need not pay for it
 
-    return read_usd(files, options.strict, options.time)
+    return read_usd(files, options.time)
 
 
 PARTS = ("lights", "camera", "shapes", "settings", "medium")  # of a scene, that contents have, too
@@ -178,7 +174,7 @@ PARTS = ("lights", "camera", "shapes", "settings", "medium")  # of a scene, that
 def _read_pbrt(files: SceneFiles, data: bytes, options: LoadOptions) -> Contents:
     from .pbrt.scene import read_scene  # here, as programs that read no such scene need not pay for it
 
-    return _contents(read_scene(files, data, mesh_reader(files, options.strict), options.strict))
+    return _contents(read_scene(files, data, mesh_reader(files)))
 
 
 def _contents(scene: Scene) -> Contents:
@@ -186,7 +182,7 @@ def _contents(scene: Scene) -> Contents:
     return replace(Contents.once([]), **{name: getattr(scene, name) for name in PARTS})
 
 
-def mesh_reader(files: SceneFiles, strict: bool) -> Callable[[Path], list[RawMesh]]:
+def mesh_reader(files: SceneFiles) -> Callable[[Path], list[RawMesh]]:
     """Return a function that reads the meshes of an obj or ply file to which a scene refers."""
 
     def read_meshes(path: Path) -> list[RawMesh]:
@@ -197,9 +193,9 @@ def mesh_reader(files: SceneFiles, strict: bool) -> Callable[[Path], list[RawMes
         data = own.read(path)
         _refuse(name, data)
         if kind == ".obj":
-            return _read_obj(own, data, LoadOptions(strict, materials=False, limits=files.limits)).raws
-        found, _ = ply.parse(own, data, strict, materials=False)
-        raws = trimesh_objects.read(found, name, strict).raws
+            return _read_obj(own, data, LoadOptions(files.losses, materials=False, limits=files.limits)).raws
+        found, _ = ply.parse(own, data, materials=False)
+        raws = trimesh_objects.read(found, name, files.losses).raws
         for raw, mesh in zip(raws, found.geometry.values(), strict=False):
             raw.attributes = ply_attributes(mesh.metadata.get("_ply_raw", {}))
         return raws

@@ -1,8 +1,7 @@
-"""Checks and repairs of a file's arrays before they become a `Mesh`. Each repair gives a warning."""
+"""Checks and repairs of a file's arrays before they become a `Mesh`. Each repair is noted."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable
 from dataclasses import dataclass, field, replace
 from typing import Any
 
@@ -10,11 +9,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..arrays.vec import FLOAT32_MAX, Bools, Doubles, Ints, cross, spans
-from ..core.errors import SceneError, printable, warn_caller
+from ..core.errors import SceneError, printable
 from ..core.plural import plural
 from ..materials import Material
 from ..shapes import Mesh
 from ..textures.parameter import Color
+from .losses import Losses
 
 MAX_UV = 2.0**24  # above, float32 has no fractions, which textures need
 AT_ONCE = 1 << 14  # faces whose area is found together, so that they fit the cache
@@ -22,19 +22,6 @@ FLAT = 1e-14  # a face is degenerate if twice its area is below this multiple of
 
 Table = Doubles
 Faces = Ints
-
-
-def warn(message: str, strict: bool) -> None:
-    """Warn of a repair; if strict, raise a SceneError instead."""
-    if strict:
-        raise SceneError(message)
-    warn_caller(message)
-
-
-def warn_of_lost(name: str, lost: Iterable[str], strict: bool) -> None:
-    """Warn of what is not honored in a file, if anything is; if strict, raise a SceneError instead."""
-    if listed := ", ".join(lost):
-        warn(f"{name}: not honored: {listed}", strict)
 
 
 def wide(values: NDArray[Any]) -> Table:
@@ -83,7 +70,7 @@ def with_face_colors(source: str, raw: RawMesh, colors: Table) -> RawMesh:
     )
 
 
-def build(source: str, raw: RawMesh, strict: bool = False) -> Mesh | None:
+def build(source: str, raw: RawMesh, losses: Losses) -> Mesh | None:
     """Return a valid mesh, or None if no face is left.
 
     Parameters
@@ -92,13 +79,13 @@ def build(source: str, raw: RawMesh, strict: bool = False) -> Mesh | None:
         File name, for messages.
     raw
         The mesh of the file.
-    strict
-        Raise an error in place of each warning of a repair.
+    losses
+        Where repairs are noted.
 
     Raises
     ------
     SceneError
-        If an index is out of range, or `strict` and anything needs repair.
+        If an index is out of range.
     """
     label = _label(source, raw)
     vertices = np.asarray(raw.vertices, np.float64).reshape(-1, 3)
@@ -107,20 +94,20 @@ def build(source: str, raw: RawMesh, strict: bool = False) -> Mesh | None:
     sound = np.all(np.abs(vertices) <= FLOAT32_MAX, axis=1)  # false for NaN
     vertices = np.where(sound[:, None], vertices, 0.0)
     keep: Bools = np.all(sound[faces], axis=1)
-    _report(label, raw, ~keep, "with a vertex that is not finite or beyond float32", strict)
+    _note_faces(losses, label, raw, ~keep, "with a vertex that is not finite or beyond float32")
     flat = keep & ~_has_area(vertices, faces)
-    _report(label, raw, flat, "of zero area", strict)
+    _note_faces(losses, label, raw, flat, "of zero area")
     faces = faces[keep & ~flat]
     if not len(faces):
         return None
     return Mesh(
         vertices,
         faces,
-        normals=_normals(label, raw.normals, vertices, faces, strict),
-        uvs=_uvs(label, "uv", raw.uvs, strict),
-        uvs1=_uvs(label, "second uv", raw.uvs1, strict),
-        tangents=None if raw.normals is None else _finite(label, "tangent", raw.tangents, 0.0, strict),
-        colors=_colors(label, raw.colors, strict),
+        normals=_normals(losses, label, raw.normals, vertices, faces),
+        uvs=_uvs(losses, label, "uv", raw.uvs),
+        uvs1=_uvs(losses, label, "second uv", raw.uvs1),
+        tangents=None if raw.normals is None else _finite(losses, label, "tangent", raw.tangents, 0.0),
+        colors=_colors(losses, label, raw.colors),
         material=raw.material,
         emission=raw.emission,
         two_sided=raw.two_sided,
@@ -140,20 +127,17 @@ def _check_indices(label: str, faces: Faces, count: int) -> None:
         raise SceneError(f"{label}: face {i} uses vertex {faces[i, j]}; it must be in [0, {count - 1}]")
 
 
-def _report(label: str, raw: RawMesh, bad: Bools, what: str, strict: bool) -> None:
+def _note_faces(losses: Losses, label: str, raw: RawMesh, bad: Bools, what: str) -> None:
     found = np.flatnonzero(bad)
     if not len(found):
         return
     first = f"face {found[0]}" if raw.lines is None else f"line {raw.lines[found[0]]}"
-    warn(
-        f"{label}: {'has' if strict else 'dropped'} {plural(len(found), 'face')} {what}, first: {first}",
-        strict,
-    )
+    losses.note(f"{plural(len(found), 'face')} {what}, first: {first}", label, done="left out")
 
 
-def _warn_of_vertices(label: str, bad: Any, what: str, state: str, strict: bool) -> None:
+def _note_vertices(losses: Losses, label: str, bad: Any, what: str, state: str, done: str) -> None:
     found = plural(int(bad.sum()), f"{what} is", f"{what}s are")
-    warn(f"{label}: {found} {state}, first: vertex {bad.argmax()}", strict)
+    losses.note(f"{found} {state}, first: vertex {bad.argmax()}", label, done=done)
 
 
 def _has_area(vertices: Table, faces: Faces) -> Bools:
@@ -168,14 +152,16 @@ def _has_area(vertices: Table, faces: Faces) -> Bools:
     return found
 
 
-def _normals(label: str, normals: Table | None, vertices: Table, faces: Faces, strict: bool) -> Table | None:
+def _normals(
+    losses: Losses, label: str, normals: Table | None, vertices: Table, faces: Faces
+) -> Table | None:
     """Return unit normals; vertices without a normal get that of a face that uses them."""
     if normals is None:
         return None
     normals = np.array(normals, np.float64)
     broken = ~np.isfinite(normals).all(axis=1)
     if broken.any():
-        _warn_of_vertices(label, broken, "normal", "not finite", strict)
+        _note_vertices(losses, label, broken, "normal", "not finite", "that of a face in its place")
         normals[broken] = 0
     largest = np.abs(normals).max(axis=1)
     absent = largest == 0
@@ -192,35 +178,35 @@ def _normals(label: str, normals: Table | None, vertices: Table, faces: Faces, s
     return normals / np.where(size > 0, size, 1)[:, None]
 
 
-def _finite(label: str, what: str, values: Table | None, otherwise: float, strict: bool) -> Table | None:
+def _finite(losses: Losses, label: str, what: str, values: Table | None, otherwise: float) -> Table | None:
     """Return values per vertex; values that are not finite in float32 are replaced by `otherwise`."""
     if values is None:
         return None
     values = np.array(values, np.float64)
     broken = ~(np.abs(values) <= FLOAT32_MAX).all(axis=1)
     if broken.any():
-        _warn_of_vertices(label, broken, what, "not finite", strict)
+        _note_vertices(losses, label, broken, what, "not finite", f"{otherwise:g} in its place")
         values[broken] = otherwise
     return values
 
 
-def _uvs(label: str, what: str, uvs: Table | None, strict: bool) -> Table | None:
+def _uvs(losses: Losses, label: str, what: str, uvs: Table | None) -> Table | None:
     """Return texture coordinates; invalid ones are replaced by 0."""
-    uvs = _finite(label, what, uvs, 0.0, strict)
+    uvs = _finite(losses, label, what, uvs, 0.0)
     if uvs is None:
         return None
     large = (np.abs(uvs) > MAX_UV).any(axis=1)
     if large.any():
-        _warn_of_vertices(label, large, what, f"beyond ±{MAX_UV:.0f} and set to 0", strict)
+        _note_vertices(losses, label, large, what, f"beyond ±{MAX_UV:.0f}", "0 in its place")
         uvs[large] = 0
     return uvs
 
 
-def _colors(label: str, colors: Table | None, strict: bool) -> Table | None:
-    colors = _finite(label, "vertex color", colors, 1.0, strict)
+def _colors(losses: Losses, label: str, colors: Table | None) -> Table | None:
+    colors = _finite(losses, label, "vertex color", colors, 1.0)
     if colors is None:
         return None
     beyond = ((colors < 0) | (colors > 1)).any(axis=1)
     if beyond.any():
-        _warn_of_vertices(label, beyond, "vertex color", "outside [0, 1] and clamped", strict)
+        _note_vertices(losses, label, beyond, "vertex color", "outside [0, 1]", "clamped")
     return np.clip(colors, 0, 1)

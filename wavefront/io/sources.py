@@ -20,6 +20,7 @@ from ..codecs.images import read_codes
 from ..core.errors import SceneError
 from ..core.files import MAX_BYTES, MAX_PIXELS, check_regular, path_name, read_bytes
 from ..core.references import GZIPPED, followed
+from .losses import Losses
 
 PathLike = str | os.PathLike[str]
 
@@ -118,11 +119,14 @@ class SceneFiles:
     scene: PathLike
     search_paths: tuple[Path, ...] = ()
     limits: LoadLimits = field(default_factory=LoadLimits)
+    losses: Losses = None  # type: ignore[assignment]  # of the load; by default of these files alone
     budget: Budget = field(init=False)  # of all these files together
     _images: dict[Path, NDArray[Any]] = field(init=False, default_factory=dict)
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "budget", Budget(self.limits.pixels, self.limits.memory_bytes))
+        if self.losses is None:
+            object.__setattr__(self, "losses", Losses(self.name))
 
     @property
     def name(self) -> str:
@@ -150,8 +154,8 @@ class SceneFiles:
         return found or allowed[0]
 
     def seen_from(self, path: PathLike) -> SceneFiles:
-        """Return the files that a file of the scene may read; the budget is that of the scene."""
-        files = SceneFiles(path, self.search_paths, self.limits)
+        """Return the files that a file of the scene may read; budget and losses are those of the scene."""
+        files = SceneFiles(path, self.search_paths, self.limits, self.losses)
         object.__setattr__(files, "budget", self.budget)
         return files
 

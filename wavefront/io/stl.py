@@ -9,7 +9,8 @@ import numpy as np
 from ..core.errors import SceneError
 from ..core.files import decode_text
 from ..core.plural import plural
-from .repair import RawMesh, warn_of_lost, wide
+from .losses import Losses
+from .repair import RawMesh, wide
 from .text_lines import NUMBER, check_lines, words
 from .trimesh_loading import geometries
 
@@ -17,21 +18,20 @@ COLORS = (b"COLOR=", b"MATERIAL=")  # keywords that Materialize Magics writes in
 OTHERS = ("", "facet", "outer", "endloop", "endfacet")  # lines of a text without further information
 
 
-def parse(name: str, data: bytes, strict: bool = False) -> list[RawMesh]:
+def parse(losses: Losses, data: bytes) -> list[RawMesh]:
     """Read the solids of an STL file. Its normals are those of the facets and are not read.
 
     Some programs store colors in a binary file. There are two conventions, which contradict each other, so
-    colors are left out with a warning.
+    colors are left out, which is noted.
 
     Raises
     ------
     SceneError
-        If the file is malformed, or `strict` and it has colors. The message names the file, and the line of a
-        text.
+        If the file is malformed. The message names the file, and the line of a text.
     """
-    count = int.from_bytes(data[80:84], "little")
+    name, count = losses.name, int.from_bytes(data[80:84], "little")
     if len(data) >= 84 and len(data) == 84 + 50 * count:
-        return _binary(name, data, strict)
+        return _binary(losses, data)
     if data.lstrip()[:5].lower() == b"solid":
         return _text(name, decode_text(data))
     if len(data) < 84:
@@ -39,13 +39,14 @@ def parse(name: str, data: bytes, strict: bool = False) -> list[RawMesh]:
     raise SceneError(f"{name}: claims {plural(count, 'face')}, {84 + 50 * count} bytes; it has {len(data)}")
 
 
-def _binary(name: str, data: bytes, strict: bool) -> list[RawMesh]:
+def _binary(losses: Losses, data: bytes) -> list[RawMesh]:
     colored = [f"{word.decode()} in the header" for word in COLORS if word in data[:80]]
-    meshes = geometries(name, "stl", data)
+    meshes = geometries(losses.name, "stl", data)
     extra = [mesh["face_attributes"]["stl"] for mesh in meshes]
     if extra and extra[0].any():
         colored.append(f"colors of facets (facet {int((extra[0] != 0).argmax())})")
-    warn_of_lost(name, colored, strict)
+    for each in colored:
+        losses.note(each)
     return [RawMesh("", wide(mesh["vertices"]), mesh["faces"]) for mesh in meshes]
 
 

@@ -22,7 +22,7 @@ from ..shapes.transform import IDENTITY, Matrix
 from .appearance import MaterialSpec, assign_material
 from .contents import Contents
 from .placing import Places
-from .repair import RawMesh, Table, warn_of_lost
+from .repair import RawMesh, Table
 from .sources import SceneFiles
 from .xml_checks import check_expanded, look_through
 
@@ -34,7 +34,7 @@ GROUPS = {"basematerials": ("base", "displaycolor"), "colorgroup": ("color", "co
 NO_COLOR = (0.5, 0.5, 0.5)  # of triangles without one beside others that have one; linear
 
 
-def parse(files: SceneFiles, data: bytes, strict: bool, materials: bool) -> Contents:
+def parse(files: SceneFiles, data: bytes, materials: bool) -> Contents:
     """Return the meshes of a 3MF file and their placements.
 
     Raises
@@ -53,7 +53,8 @@ def parse(files: SceneFiles, data: bytes, strict: bool, materials: bool) -> Cont
         of.append(numbers.setdefault(key, len(numbers)))
         matrices.append(matrix)
     raws = [package.raw(key, materials) for key in numbers]
-    warn_of_lost(name, package.lost if materials else (), strict)
+    for each in package.lost if materials else ():
+        files.losses.note(each)
     return Contents(raws, Places(np.array(of, np.intp), np.array(matrices).reshape(-1, 4, 4)))
 
 

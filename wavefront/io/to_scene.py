@@ -147,13 +147,15 @@ def _joined(
     bodies = (item for item in subjects if not isinstance(item, Light))
     parts = [as_scene(item, material, progress, smooth, within) for item in bodies]
     cameras = [part.camera for part in parts if part.camera is not None]
-    return Scene(
+    scene = Scene(
         [shape for part in parts for shape in part.shapes],
         [*lights, *(light for part in parts for light in part.lights)],
         cameras[0] if cameras else None,
         up=next((part.up for part in parts if part.up is not None), None),
         settings=next((part.settings for part in parts if part.settings), None),
     )
+    scene.losses = tuple(loss for part in parts for loss in part.losses)
+    return scene
 
 
 def _made_of(shape: Shape, material: Material | None, smooth: bool | float | str) -> Shape:

@@ -14,7 +14,6 @@ import numpy as np
 from ..codecs.images import decode_codes
 from ..core.errors import SceneError
 from ..core.interrupt import repeated_ctrl_c
-from .repair import warn
 from .sources import SceneFiles
 from .trimesh_import import import_trimesh
 
@@ -44,12 +43,12 @@ class Images:
         self.missing.append(reference)
         raise FileNotFoundError(reference)
 
-    def report(self, strict: bool) -> None:
-        """Warn of missing images; raise the first error that trimesh ignored."""
+    def report(self) -> None:
+        """Note missing images; raise the first error that trimesh ignored."""
         if self.error is not None:
             raise self.error
         for name in dict.fromkeys(self.missing):
-            warn(f"{self.files.name}: texture {name!r} is missing", strict)
+            self.files.losses.note(f"texture {name!r}", value="missing", done="left out")
 
 
 def by_trimesh(name: str, data: bytes, kind: str, images: Any = None, skip_materials: bool = False) -> Any:

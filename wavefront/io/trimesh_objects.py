@@ -17,9 +17,10 @@ from ..textures.normal_map import NormalMap
 from . import mtl
 from .appearance import MaterialSpec, assign_material, build_material, from_srgb, is_faint
 from .contents import Contents
+from .losses import Losses
 from .mtl import MATTE
 from .placing import Places
-from .repair import RawMesh, Table, warn_of_lost, with_face_colors
+from .repair import RawMesh, Table, with_face_colors
 from .trimesh_import import import_trimesh
 
 if TYPE_CHECKING:
@@ -32,10 +33,10 @@ FLAT = ("glb", "gltf")  # formats in which meshes without normals have flat face
 BARE = ("obj", "ply")  # formats whose materials may lack a color; trimesh then invents a gray one
 
 
-def read(geometry: Any, source: str, strict: bool) -> Contents:
+def read(geometry: Any, source: str, losses: Losses) -> Contents:
     """Return the meshes of a trimesh object with their materials and placements."""
     trimesh = import_trimesh()
-    specs = _Visuals()
+    specs = _Visuals(losses)
     numbers: dict[int, int] = {}
     raws: list[RawMesh] = []
     nodes = _nodes(geometry, trimesh)
@@ -44,7 +45,6 @@ def read(geometry: Any, source: str, strict: bool) -> Contents:
             numbers[id(mesh)] = len(raws)
             raws.append(_raw(mesh, name, source))
             specs.assign_material(raws[-1], mesh, {geometry.source.file_type, mesh.source.file_type})
-    warn_of_lost(source, (f"{what} (mesh {where!r})" for what, where in specs.lost.items()), strict)
     of = np.array([numbers[id(mesh)] for mesh, *_ in nodes], np.intp)
     matrices = np.array([matrix for *_, matrix, _ in nodes]).reshape(-1, 4, 4)
     several = np.bincount(of, minlength=len(raws)).take(of) > 1
@@ -93,35 +93,39 @@ def _raw(mesh: trimesh.Trimesh, name: str, source: str) -> RawMesh:
 class _Visuals:
     """The materials of trimesh visuals, each made once, and their unsupported properties."""
 
-    def __init__(self) -> None:
+    def __init__(self, losses: Losses) -> None:
         self._specs: dict[int, MaterialSpec] = {}
-        self.lost: dict[str, str] = {}  # property -> its first place
+        self._losses = losses
 
     def assign_material(self, raw: RawMesh, mesh: trimesh.Trimesh, file_types: set[str | None]) -> None:
         """Give a raw mesh its material and emission; `file_types` are the formats that it was read from."""
         visual: Any = mesh.visual
         spec = self._spec(getattr(visual, "material", None), not file_types.isdisjoint(BARE))
         for what in spec.lost if spec is not None else ():
-            self.lost.setdefault(what, raw.name)
+            self._lose(what, raw)
         painted = visual.kind == "face"
         if not assign_material(raw, spec) or (painted and raw.colors is None):
-            self.lost.setdefault("face colors" if painted else "vertex colors", raw.name)
+            self._lose("face colors" if painted else "vertex colors", raw)
         shown = {visual.kind, "face"} if _shows_face_colors(mesh) else {visual.kind}
         for element in ("vertex", "face"):
             if element not in shown and _ply_has_colors(mesh, element):
-                self.lost.setdefault(f"{element} colors", raw.name)
+                self._lose(f"{element} colors", raw)
         if spec is None and is_faint(raw) and not _is_gltf(mesh):  # where it has no effect
-            self.lost.setdefault("opacity of vertex colors", raw.name)
+            self._lose("opacity of vertex colors", raw)
+
+    def _lose(self, what: str, raw: RawMesh) -> None:
+        self._losses.note(what, f"mesh {raw.name!r}")
 
     def _spec(self, material: Any, bare: bool) -> MaterialSpec | None:
         if material is None or _is_blank(material):
             return None
         if id(material) not in self._specs:
-            self._specs[id(material)] = _material_spec(material, f"trimesh material {material.name!r}", bare)
+            where = f"trimesh material {material.name!r}"
+            self._specs[id(material)] = _material_spec(material, where, bare, self._losses)
         return self._specs[id(material)]
 
 
-def _material_spec(material: Any, where: str, bare: bool) -> MaterialSpec:
+def _material_spec(material: Any, where: str, bare: bool, losses: Losses) -> MaterialSpec:
     """Return the material of a trimesh `PBRMaterial` or `SimpleMaterial`; `where` is for messages.
 
     If `bare`, the colors and the exponent of the highlight count only if the material has its own `Kd`, `Ks`
@@ -130,7 +134,7 @@ def _material_spec(material: Any, where: str, bare: bool) -> MaterialSpec:
     if hasattr(material, "baseColorFactor"):
         found = _pbr(material)
     elif hasattr(material, "diffuse"):
-        found = _simple(material, where, bare)
+        found = _simple(material, where, bare, losses)
     else:
         found = MaterialSpec(Material(Diffuse(MATTE)), lost=[type(material).__name__])
     name = getattr(material, "name", None)
@@ -263,9 +267,9 @@ def _pbr(material: Any) -> MaterialSpec:
     return MaterialSpec(made, radiance, bool(material.doubleSided), occluded + lost, alpha, cutoff)
 
 
-def _simple(material: Any, where: str, bare: bool) -> MaterialSpec:
+def _simple(material: Any, where: str, bare: bool, losses: Losses) -> MaterialSpec:
     """Read an MTL material: trimesh keeps its lines as lists of words."""
-    entry = mtl.Entry(where, str(material.name or ""))
+    entry = mtl.Entry(where, str(material.name or ""), losses=losses)
     lines = {key: value for key, value in material.kwargs.items() if key != "name"}
     if not bare:
         for key, codes in (("kd", material.diffuse), ("ks", material.specular)):

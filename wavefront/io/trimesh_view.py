@@ -8,12 +8,11 @@ import numpy as np
 
 from ..camera import Camera
 from ..camera.projection import Perspective
-from ..core.errors import SceneError
+from ..core.errors import SceneError, warn_caller
 from ..lights import DirectionalLight, PointLight, SpotLight
 from ..scene import Scene
 from ..shapes.transform import Matrix
 from . import gltf
-from .repair import warn
 
 SOURCE = "trimesh object"
 KINDS = {"PointLight": "point", "DirectionalLight": "directional", "SpotLight": "spot"}
@@ -35,7 +34,7 @@ def add_camera(scene: Scene, geometry: Any) -> None:
         return
     if geometry.source is not None and geometry.source.file_type in ("glb", "gltf"):
         # trimesh ignores the parent nodes of the camera, so its position is wrong
-        warn(f"{SOURCE}: not honored: the camera of its glTF file; wf.load reads it", strict=False)
+        warn_caller(f"{SOURCE}: not honored: the camera of its glTF file; wf.load reads it")
         return
     camera = geometry.camera
     width, height = (int(side) for side in camera.resolution)
@@ -43,7 +42,7 @@ def add_camera(scene: Scene, geometry: Any) -> None:
     matrix = _transform(geometry, camera.name)
     try:
         if matrix is None:
-            warn(f"{SOURCE}: its camera has no transform; it is placed to see all of the scene", strict=False)
+            warn_caller(f"{SOURCE}: its camera has no transform; it is placed to see all of the scene")
             placed = scene.framing_camera(fov=fov, size=(width, height))
         else:
             placed = gltf.camera_at(matrix, fov, (width, height))
@@ -79,7 +78,7 @@ def lights(geometry: Any) -> list[DirectionalLight | PointLight | SpotLight]:
     # reading `lights` would add default lights
     given = getattr(geometry, "_lights", None) or []
     if given and all(_is_made_up(light) for light in given):
-        warn(f"{SOURCE}: not honored: the lights that trimesh made for its viewer", strict=False)
+        warn_caller(f"{SOURCE}: not honored: the lights that trimesh made for its viewer")
         return []
     return [_light(geometry, light) for light in given]
 
@@ -90,10 +89,10 @@ def _light(geometry: Any, light: Any) -> DirectionalLight | PointLight | SpotLig
     if kind is None:
         raise SceneError(f"{label} is a {type(light).__name__}; it must be one of {', '.join(KINDS)}")
     if light.radius is not None:
-        warn(f"{label}: not honored: radius", strict=False)
+        warn_caller(f"{label}: not honored: radius")
     matrix = _transform(geometry, light.name)
     if matrix is None:
-        warn(f"{label} has no transform; it stands at the origin and looks along -z", strict=False)
+        warn_caller(f"{label} has no transform; it stands at the origin and looks along -z")
         matrix = np.eye(4)
     json: dict[str, Any] = {"type": kind, "intensity": light.intensity}
     json["color"] = [int(code) / 255 for code in light.color[:3]]

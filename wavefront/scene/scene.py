@@ -23,6 +23,7 @@ from ..media import BaseMedium
 from ..shapes import Group, Instance, Mesh, PrimitiveArray, Shape
 from ..shapes.instance import instance_bounds, instance_hulls
 from .html import scene_html
+from .loss import Loss
 
 AUTO = "auto"
 FRAMING_FOV = 40.0  # degrees
@@ -71,6 +72,12 @@ class Scene:
     in the constructor. The accelerator of a render is kept with the scene, and is used again as long as no
     vertex and no sphere has moved.
 
+    Attributes
+    ----------
+    losses
+        What of its file a scene does not show as the file says: a tuple of `Loss`. It is empty for a scene
+        made in Python.
+
     Raises
     ------
     SceneError
@@ -102,6 +109,7 @@ class Scene:
         self.up = up
         self.settings = dict(settings or {})
         self.medium = medium
+        self.losses: tuple[Loss, ...] = ()  # what of its file it does not show as the file says
         self.accelerators = AcceleratorCache()  # of the last render, for the next one
         self.check()
 

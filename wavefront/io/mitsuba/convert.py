@@ -23,7 +23,6 @@ def convert(
     files: SceneFiles,
     find: Callable[[str], Path],
     read_mesh: Callable[[Path], list[RawMesh]],
-    strict: bool,
 ) -> Scene:
     """Return the scene of a dictionary.
 
@@ -39,17 +38,14 @@ def convert(
         Returns the path of a file that the scene names.
     read_mesh
         Returns the meshes of an obj or ply file.
-    strict
-        Raise an error for what is not honored, in place of a warning.
 
     Raises
     ------
     SceneError
         If the scene is malformed.
     """
-    job = Job(name, files, find, read_mesh, strict)
-    made: Scene = job.convert(Graph(name, job.lost).build(scene))
-    job.lost.report(name, strict)
+    job = Job(name, files, find, read_mesh)
+    made: Scene = job.convert(Graph(name, files.losses).build(scene))
     return made
 
 

@@ -79,7 +79,7 @@ class Node(Part):
 
     def lose(self, what: str) -> None:
         """Note something that is not honored."""
-        self.lost.note(f"{self.label}: {what}")
+        self.lost.note(what, self.label)
 
     def get(self, name: str, default: Any = None) -> Any:
         """Return a parameter, which the table must say is read."""

@@ -196,7 +196,7 @@ def _mesh(node: Node, job: Job, raw: RawMesh, smooth: bool = False, closed: bool
     material, emission = _appearance(node, job, closed)
     name = node.id or raw.name
     raw = replace(raw, name=name, material=material, emission=emission, smooth=smooth, tangents=None)
-    mesh = build(job.name, raw, job.strict)
+    mesh = build(job.name, raw, job.files.losses)
     return [] if mesh is None else [mesh]
 
 

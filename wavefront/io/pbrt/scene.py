@@ -110,13 +110,14 @@ class Reader:
             found += place_object(self.objects[name], job, np.array(matrices))
         lamps = [light for entity in self.lights if (light := job.convert(entity)) is not None]
         view = None if camera is None else job.convert(camera)
-        job.lost.report(job.name, job.strict)
         return Scene(found, lamps, view, settings=settings, medium=job.around)
 
     def _entity(self, kind: str, statement: Statement, target: str, type: str, name: str = "") -> Entity:
         given = self.state.defaults.get(target, {}) | statement.parameters
         matrix = self.state.matrices[0]
-        return Entity(kind, type, statement.place, given, self.job.lost, matrix, self.state, name=name)
+        return Entity(
+            kind, type, statement.place, given, self.job.files.losses, matrix, self.state, name=name
+        )
 
     def _still(self, entity: Entity) -> Entity:
         """Note if something moves while the shutter is open."""
@@ -189,12 +190,12 @@ class Reader:
     def _ColorSpace(self, statement: Statement) -> None:
         if statement.words[0] != "srgb":
             what = f"ColorSpace {statement.words[0]!r}; 'srgb' in its place"
-            self.job.lost.note(what, statement.place)
+            self.job.files.losses.note(what, statement.place)
 
     def _Option(self, statement: Statement) -> None:
         name, value = statement.words
         if name.lower() not in HARMLESS.split() and value != "false":
-            self.job.lost.note(f"Option {name!r}", statement.place)
+            self.job.files.losses.note(f"Option {name!r}", statement.place)
 
     def _TransformTimes(self, statement: Statement) -> None:
         """Do nothing: what moves is noted."""
@@ -277,9 +278,7 @@ class Reader:
         self.uses.setdefault(name, []).append(self.state.matrices[0])
 
 
-def read_scene(
-    files: SceneFiles, data: bytes, read_mesh: Callable[[Path], list[RawMesh]], strict: bool
-) -> Scene:
+def read_scene(files: SceneFiles, data: bytes, read_mesh: Callable[[Path], list[RawMesh]]) -> Scene:
     """Return the scene of a file.
 
     Parameters
@@ -290,8 +289,6 @@ def read_scene(
         Its content.
     read_mesh
         Returns the meshes of a ply file.
-    strict
-        Raise an error for what is not honored, in place of a warning.
 
     Raises
     ------
@@ -305,7 +302,7 @@ def read_scene(
             raise SceneError(f"file {reference!r} is missing")
         return path
 
-    reader = Reader(Job(files.name, files, find, read_mesh, strict))
+    reader = Reader(Job(files.name, files, find, read_mesh))
     for statement in statements(files, Path(files.name), data):
         with placed(statement.place):
             reader.run(statement)

@@ -226,7 +226,7 @@ def _mesh(entity: Entity, job: Job, matrix: Matrix, light: Entity | None) -> Mes
     job.count(raw.faces)
     raw.material = material_of(entity.state, _opacity(entity, light, job), job, entity)
     raw.emission, raw.two_sided = _emission(light, area, job)
-    return build(entity.place, _with_coordinates(entity, raw), job.strict)
+    return build(entity.place, _with_coordinates(entity, raw), job.files.losses)
 
 
 def _with_coordinates(entity: Entity, raw: RawMesh) -> RawMesh:

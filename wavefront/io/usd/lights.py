@@ -154,7 +154,7 @@ def _cylinder(lamp: Lamp) -> Shape | None:
     side = along("X", revolved(lamp.name, [slope((radius, radius), (-half, half))]))
     along_x, y, z = lamp.scale.tolist()
     side.emission = lamp.strength(4 * math.pi * radius * math.sqrt(y * z) * half * along_x)
-    return build("", moved_raw(side, lamp.matrix))
+    return build("", moved_raw(side, lamp.matrix), lamp.materials.files.losses)
 
 
 LAMPS = {

@@ -20,7 +20,7 @@ from ...shapes.transform import Matrix
 from ..contents import Contents
 from ..conversion import placed
 from ..placing import Places
-from ..repair import RawMesh, warn_of_lost
+from ..repair import RawMesh
 from ..sources import SceneFiles
 from .gprims import GPRIMS
 from .lights import LAMPS, Lamp
@@ -33,7 +33,7 @@ MOST_PRIMS = 2**20
 HARMLESS = ("Scope", "Xform", "Material", "Shader", "NodeGraph", "GeomSubset", "RenderSettings", "")
 
 
-def read_usd(files: SceneFiles, strict: bool, time: float | None = None) -> Contents:
+def read_usd(files: SceneFiles, time: float | None = None) -> Contents:
     """Return the contents of a file of USD (.usd, .usda, .usdc, .usdz) at a time code, by default the first.
 
     Raises
@@ -52,7 +52,7 @@ def read_usd(files: SceneFiles, strict: bool, time: float | None = None) -> Cont
         for layer in stage.GetUsedLayers() if known else ():  # its files may have changed since
             layer.Reload(force=True)
         _check_layers(files, stage)
-        return _Reader(files, stage, time).contents(strict)
+        return _Reader(files, stage, time).contents()
     except SceneError as error:
         raise error if str(error).startswith(name) else SceneError(f"{name}: {error}") from error
     except (RuntimeError, TypeError, ValueError, IndexError) as error:  # also those of pxr.Tf
@@ -75,7 +75,6 @@ class _Reader:
         start = stage.GetStartTimeCode() if time is None and stage.HasAuthoredTimeCodeRange() else time
         self.time = Usd.TimeCode.Default() if start is None else Usd.TimeCode(start)
         self.files, self.stage, self.cache = files, stage, UsdGeom.XformCache(self.time)
-        self.lost: dict[tuple[str, str], None] = {}
         self.materials = Materials(files, self.time, self.lose)
         self.meshes = Meshes(self.materials)
         self.raws: list[RawMesh] = []
@@ -88,19 +87,18 @@ class _Reader:
 
     def lose(self, prim: Any, what: str) -> None:
         """Note what is not honored."""
-        self.lost[str(prim.GetPath()), what] = None
+        self.files.losses.note(what, str(prim.GetPath()))
 
-    def contents(self, strict: bool) -> Contents:
+    def contents(self) -> Contents:
         """Return what the stage holds."""
         from pxr import UsdGeom
 
         unit = float(UsdGeom.GetStageMetersPerUnit(self.stage))
         self.unit = number("metersPerUnit", unit, lambda x: x > 0, "above 0")
         for error in self.stage.GetCompositionErrors():
-            self.lost["composition", " ".join(str(error).split())[:200]] = None
+            self.files.losses.note(" ".join(str(error).split())[:200], "composition")
         self.root = np.diag([self.unit] * 3 + [1.0])  # from the stage to the scene
         self._place(self.stage.GetPseudoRoot(), self.root[None])
-        warn_of_lost(self.files.name, (f"{where} {what}" for where, what in self.lost), strict)
         counts = [len(matrices) for _, matrices in self.placed]
         numbers = np.repeat(np.array([index for index, _ in self.placed], np.intp), counts)
         places = Places(numbers, np.concatenate([np.zeros((0, 4, 4)), *(each for _, each in self.placed)]))
