@@ -19,7 +19,7 @@ from pictures import HEIGHT, WIDTH, with_everything
 from PIL import Image as PillowImage
 
 import wavefront as wf
-from wavefront.codecs import png_jpeg
+from wavefront.codecs import png_jpeg, raster
 from wavefront.codecs.image_data import from_named
 from wavefront.film.aov_names import AOVS
 
@@ -302,7 +302,7 @@ def test_every_filter_of_a_png_is_read(channels):
     rows = codes.astype(">u2").view(np.uint8).reshape(12, 9, -1)
     other = png(codes, filtered(rows, [4, 3, 2, 1, 0, 4, 4, 3, 1, 2, 3, 4]))
     for each in (png_jpeg.encode(codes, ".png", "srgb"), other):
-        assert (png_jpeg.decode(each) == codes).all()
+        assert (raster.decode(each) == codes).all()
 
 
 def test_an_interlaced_png_of_16_bits_is_read():
@@ -310,7 +310,7 @@ def test_an_interlaced_png_of_16_bits_is_read():
     steps = [(0, 0, 8, 8), (4, 0, 8, 8), (0, 4, 4, 8), (2, 0, 4, 4), (0, 2, 2, 4), (1, 0, 2, 2), (0, 1, 1, 2)]
     rows = (row for x, y, dx, dy in steps for row in codes[y::dy, x::dx])
     pixels = b"".join(b"\0" + row.astype(">u2").tobytes() for row in rows)
-    assert (png_jpeg.decode(png(codes, pixels, interlaced=1)) == codes).all()
+    assert (raster.decode(png(codes, pixels, interlaced=1)) == codes).all()
 
 
 @pytest.mark.parametrize("shape", [(1, 1), (1, 8), (8, 1), (33, 20)])
@@ -465,7 +465,7 @@ def test_a_member_that_inflates_to_more_than_it_claims_is_refused(tmp_path):
     entry = data.rindex(b"PK\x01\x02")
     path.write_bytes(data[: entry + 24] + struct.pack("<I", len(content)) + data[entry + 28 :])
     tracemalloc.start()
-    with pytest.raises(wf.SceneError, match=r"a\.npz: not a readable npz image: Bad CRC"):
+    with pytest.raises(wf.SceneError, match=r"a\.npz: not a readable npz file: Bad CRC"):
         wf.Image.load(path)
     assert tracemalloc.get_traced_memory()[1] < 2**23
     tracemalloc.stop()
@@ -476,7 +476,7 @@ def test_missing_rgb_and_no_archive(tmp_path):
     with pytest.raises(wf.SceneError, match=r"a\.npz: the array 'rgb' is missing"):
         wf.Image.load(tmp_path / "a.npz")
     (tmp_path / "a.npz").write_bytes(b"hello")
-    with pytest.raises(wf.SceneError, match=r"a\.npz: not a readable npz image"):
+    with pytest.raises(wf.SceneError, match=r"a\.npz: not a readable npz file"):
         wf.Image.load(tmp_path / "a.npz")
     with pytest.raises(wf.SceneError, match=r"a\.npz: there is no such file|the array 'rgb' is missing"):
         from_named({}, {})

@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 import sys
 import threading
-from collections.abc import Callable
 from contextlib import redirect_stdout
 from functools import partial
 from io import BytesIO
@@ -19,8 +18,10 @@ from ..core.errors import SaveError, SceneError
 from ..core.files import MAX_PIXELS
 from ..film.aov_names import components
 from .budget import Budget
+from .exr_layers import chosen
 from .image_data import ERROR, ImageData, from_json, from_named, to_json
 
+SIGNATURE = b"\x76\x2f\x31\x01"
 ATTRIBUTE = "wavefront"  # the attribute that describes all arrays
 TYPES = ("f4", "u4", "i4", "f8", "i8", "u8")  # of arrays, as NumPy writes them
 
@@ -81,18 +82,22 @@ def _fits(value: Any) -> bool:
 
 
 def decode(data: bytes, budget: Budget | None = None) -> Floats:
-    """Return the pixels of the first part of an exr file, (H, W, C) float32, top row first.
+    """Return the pixels of one layer of an exr file, (H, W, C) float32, top row first.
 
-    The channels C are R, G, B and A if they exist, else the first channel by name.
+    The layer is the picture itself (`exr_layers.chosen`). The channels C are red, green, blue and alpha, or
+    gray and alpha, as far as they exist.
 
     Raises
     ------
     SceneError
         If the file claims too much, holds deep pixels, or a part of it cannot be decoded.
     """
-    channels = _channels(data, budget or Budget.of(data))
-    names = [n for n in ("R", "G", "B", "A") if n in channels] or sorted(channels)[:1]
-    return np.stack([channels[name]().astype(np.float32, copy=False) for name in names], axis=-1)
+    parts = _parts(data, budget or Budget.of(data))
+    layer = chosen([(part.name() or "", list(part.channels), dict(part.header)) for part in parts])
+    part = parts[layer.part]
+    size = _window(part)
+    channels = {name: _pixels(part.channels[name], size) for name in layer.channels.values()}
+    return layer.picture(channels, part.header.get("chromaticities"))
 
 
 def decode_all(data: bytes, budget: Budget | None = None) -> ImageData | None:
@@ -108,7 +113,9 @@ def decode_all(data: bytes, budget: Budget | None = None) -> ImageData | None:
     text = OpenEXR.File(BytesIO(data), header_only=True).header().get(ATTRIBUTE)
     if not isinstance(text, str):
         return None
-    info, channels = from_json(text), _channels(data, budget or Budget.of(data))
+    info, first = from_json(text), _parts(data, budget or Budget.of(data))[0]
+    size = _window(first)
+    channels = {name: partial(_pixels, each, size) for name, each in first.channels.items()}
     layout = info.pop("arrays", {})
     try:
         arrays = {
@@ -130,12 +137,12 @@ def _array(words: list[NDArray[Any]], part: dict[str, Any]) -> NDArray[Any]:
     return values.reshape(*stacked.shape[:2], *part["shape"])
 
 
-def _channels(data: bytes, budget: Budget) -> dict[str, Callable[[], NDArray[Any]]]:
-    """Return functions for the channels (H, W) of the first part of an exr file, by name."""
+def _parts(data: bytes, budget: Budget) -> list[Any]:
+    """Return the parts of an exr file, with the pixels of each channel."""
     import OpenEXR
 
     claimed = OpenEXR.File(BytesIO(data), header_only=True).parts
-    size = _check_header(claimed, len(data), budget)
+    _check_header(claimed, len(data), budget)
     # OpenEXR decodes all parts, and leaves out those that it cannot decode.
     with _LOCK, redirect_stdout(_OneThread(sys.stdout)):  # it prints warnings of parts
         parts = OpenEXR.File(BytesIO(data), separate_channels=True).parts
@@ -143,7 +150,7 @@ def _channels(data: bytes, budget: Budget) -> dict[str, Callable[[], NDArray[Any
     for part in claimed:
         if (part.part_index, part.name()) not in read:
             raise SceneError(f"part {part.part_index} ({part.name()!r}) of {len(claimed)} is damaged")
-    return {name: partial(_pixels, name, each.pixels, size) for name, each in parts[0].channels.items()}
+    return list(parts)
 
 
 class _OneThread:
@@ -160,18 +167,33 @@ class _OneThread:
         return getattr(self._out, name)
 
 
-def _pixels(name: str, values: NDArray[Any], size: tuple[int, int]) -> NDArray[Any]:
-    """Return the values of a channel if it has those of every pixel; some have fewer."""
-    if values.shape != size:
+def _pixels(channel: Any, size: tuple[int, int]) -> NDArray[Any]:
+    """Return the values of a channel for every pixel; some have values for every second one."""
+    values, steps = channel.pixels, (int(channel.ySampling), int(channel.xSampling))
+    there = tuple(-(-length // step) for length, step in zip(size, steps, strict=True))
+    if min(steps) < 1 or values.shape != there or min(there) < 1:
         raise SceneError(
-            f"channel {name!r} has {values.shape[1]} × {values.shape[0]} values; "
+            f"channel {channel.name!r} has {values.shape[1]} × {values.shape[0]} values; "
             f"the picture has {size[1]} × {size[0]} pixels"
         )
+    for axis in range(2):
+        if steps[axis] > 1:
+            values = _spread(values, axis, steps[axis], size[axis])
     return values
 
 
-def _check_header(parts: list[Any], size: int, budget: Budget) -> tuple[int, int]:
-    """Check the headers of all parts, and return (height, width) of the first one."""
+def _spread(values: NDArray[Any], axis: int, step: int, length: int) -> Floats:
+    """Return values at all pixels along an axis, between those at every `step`-th one."""
+    at = np.arange(length) / np.float32(step)
+    low = at.astype(np.intp)
+    high = np.minimum(low + 1, values.shape[axis] - 1)
+    weight = (at - low).astype(np.float32).reshape((-1, 1) if axis == 0 else (1, -1))
+    one, two = (values.take(places, axis).astype(np.float32) for places in (low, high))
+    return one + (two - one) * weight
+
+
+def _check_header(parts: list[Any], size: int, budget: Budget) -> None:
+    """Check the headers of all parts."""
     import OpenEXR
 
     if not parts:
@@ -189,7 +211,6 @@ def _check_header(parts: list[Any], size: int, budget: Budget) -> tuple[int, int
         )
     height, width = _window(parts[0])
     budget.charge(f"the channels of {width} × {height} pixels", VALUE_BYTES * values)
-    return height, width
 
 
 def _window(part: Any) -> tuple[int, int]:

@@ -11,12 +11,25 @@ import re
 
 import numpy as np
 
-from ..arrays.vec import Bytes, Floats
-from ..core.errors import SceneError
+from ..arrays.vec import Bytes, Doubles, Floats
+from ..colors.primaries import REC_709, to_srgb
+from ..core.errors import SceneError, warn_caller
 from .budget import Budget
 
 SIGNATURES = (b"#?RADIANCE", b"#?RGBE")
 PIXEL_BYTES = 48  # of memory for each pixel, until it is float32
+LENGTHS = {"EXPOSURE": 1, "COLORCORR": 3, "PRIMARIES": 8}  # numbers in lines of the header
+DEFAULT = (
+    0.64,
+    0.33,
+    0.29,
+    0.6,
+    0.15,
+    0.06,
+    0.3333,
+    0.3333,
+)  # Radiance's primaries, also those of files that name none
+SAME = 1e-3
 MIN_RUN = 4  # shorter runs take more bytes than literals
 
 
@@ -33,27 +46,80 @@ def encode(pixels: Floats) -> bytes:
 
 
 def decode(data: bytes, budget: Budget | None = None) -> Floats:
-    """Return the pixels (H, W, 3) of a .hdr file, top row first.
+    """Return the radiance (H, W, 3) of a .hdr file in linear sRGB, top row first.
+
+    Stored values are divided by those of all lines EXPOSURE= and COLORCORR=, and converted from PRIMARIES= to
+    those of sRGB.
 
     Raises
     ------
     SceneError
         If the file is not RGBE, is damaged or ends early.
     """
-    head = re.match(rb"(#\?[^\n]*)\n(?:[^\n]+\n)*?\n([-+][XY]) (\d+) ([-+][XY]) (\d+)\n", data)
-    if not head or not head[1].startswith(SIGNATURES):
+    head = re.match(rb"(#\?[^\n]*)\n(?:[^\n]+\n)*?\n([-+])([XY]) (\d+) ([-+])([XY]) (\d+)\n", data)
+    if not head or not head[1].startswith(SIGNATURES) or head[3] == head[6]:
         raise SceneError("not a Radiance .hdr picture: its header is damaged")
     if b"FORMAT=32-bit_rle_xyze" in head[0]:
         raise SceneError("holds XYZ colors (32-bit_rle_xyze); only RGB (32-bit_rle_rgbe) is read")
-    if (head[2], head[4]) != (b"-Y", b"+X"):
-        raise SceneError(f"rows run {(head[2] + b' ' + head[4]).decode()}; only -Y +X is read")
-    height, width = int(head[3]), int(head[5])
+    rows, columns = int(head[4]), int(head[7])  # as they are stored
     budget = budget or Budget.of(data)
-    budget.check_size(height, width)
-    rows = np.frombuffer(data, np.uint8, offset=head.end())
-    is_flat = _check_header(rows, height, width)
-    budget.charge(f"a picture of {width} × {height} pixels", PIXEL_BYTES * height * width)
-    return from_rgbe(rows.reshape(height, width, 4) if is_flat else _scanlines(rows, height, width))
+    budget.check_size(rows, columns)
+    stored = np.frombuffer(data, np.uint8, offset=head.end())
+    is_flat = _check_header(stored, rows, columns)
+    budget.charge(f"a picture of {columns} × {rows} pixels", PIXEL_BYTES * rows * columns)
+    pixels = from_rgbe(stored.reshape(rows, columns, 4) if is_flat else _scanlines(stored, rows, columns))
+    flipped = pixels[:: _step(head[2], head[3]), :: _step(head[5], head[6])]
+    upright = flipped if head[3] == b"Y" else flipped.transpose(1, 0, 2)
+    return _original(np.ascontiguousarray(upright), head[0].decode("latin-1"))
+
+
+def _step(sign: bytes, axis: bytes) -> int:
+    """Return -1 where the first row is the lowest, or the first column the rightmost."""
+    return 1 if (sign, axis) in ((b"-", b"Y"), (b"+", b"X")) else -1
+
+
+def _original(pixels: Floats, header: str) -> Floats:
+    """Return the radiance before the changes that lines of the header tell of."""
+    factors = np.ones(3)
+    for name, value in re.findall(r"^(EXPOSURE|COLORCORR|PRIMARIES)\s*=\s*(.*)$", header, re.M):
+        numbers = _numbers(value, LENGTHS[name])
+        if numbers is None or (name != "PRIMARIES" and not (numbers > 0).all()):
+            warn_caller(f"the line {name}={value[:40]} has no sound values and does not count")
+        elif name == "PRIMARIES":
+            pixels = _from_primaries(pixels, numbers)
+        else:
+            factors *= numbers
+    if (factors == 1).all():
+        return pixels
+    with np.errstate(
+        over="ignore", divide="ignore", invalid="ignore"
+    ):  # what is not finite is reported where it matters
+        return (pixels / factors).astype(np.float32)
+
+
+def _numbers(text: str, length: int) -> Doubles | None:
+    try:
+        numbers = np.array([float(word) for word in text.split()])
+    except ValueError:
+        return None
+    return numbers if len(numbers) == length and np.isfinite(numbers).all() else None
+
+
+def _from_primaries(pixels: Floats, primaries: Doubles) -> Floats:
+    """Return linear sRGB; white stays white, as Radiance's own programs keep it."""
+    if np.abs(primaries - REC_709).max() < SAME or np.abs(primaries - DEFAULT).max() < SAME:
+        return pixels
+    try:
+        with np.errstate(all="ignore"):
+            matrix = to_srgb(primaries)
+    except np.linalg.LinAlgError:
+        matrix = np.full((3, 3), np.nan)
+    if not np.isfinite(matrix).all():
+        warn_caller(f"the line PRIMARIES={primaries.tolist()} has no sound values and does not count")
+        return pixels
+    red, green, blue = (pixels[..., k].astype(np.float64) for k in range(3))
+    rows = [row[0] * red + row[1] * green + row[2] * blue for row in matrix]
+    return np.maximum(np.stack(rows, axis=-1), 0).astype(np.float32)
 
 
 def _check_header(data: Bytes, height: int, width: int) -> bool:

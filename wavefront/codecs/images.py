@@ -1,7 +1,9 @@
-"""Reading and writing of image files by extension: png, jpg, exr, hdr, npy, npz.
+"""Reading and writing of image files.
 
-Values in the package are linear. `write_image` encodes them for display, and `read_picture` decodes them. The
-other readers do not decode: a texture may hold colors or data, which only the caller knows.
+They are written by extension. They are read by their first bytes where these say what they are, as files may
+have a wrong extension or none. Values in the package are linear. `write_image` encodes them for display, and
+`read_picture` decodes them. The other readers do not decode: a texture may hold colors or data, which only
+the caller knows.
 """
 
 from __future__ import annotations
@@ -16,11 +18,11 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ..arrays.vec import Floats
-from ..core.errors import SaveError, SceneError, as_array, warn_caller
-from ..core.files import check_target, extension_of, read_bytes, write_bytes
+from ..core.errors import SaveError, SceneError, as_array, collect_warnings, warn_caller
+from ..core.files import check_regular, check_target, extension_of, path_name, read_bytes, write_bytes
 from ..core.plural import plural
 from ..core.registry import Registry
-from . import exr, npz
+from . import exr, npz, pnm, raster
 from . import hdr as rgbe
 from . import png_jpeg as coded
 from .budget import Budget, in_memory
@@ -130,10 +132,14 @@ def read_image(path: str | os.PathLike[str]) -> Floats:
 def read_codes(path: str | os.PathLike[str], budget: Budget | None = None) -> NDArray[Any]:
     """Return the pixels of an image file as stored, uint8, uint16 or float32, (H, W, C)."""
     budget = budget or Budget()
-    decode, data = _find(IMAGE_READERS, path), read_bytes(path)
+    if not Path(path_name(path)).suffix:
+        check_regular(path)  # what it is, its first bytes say
+    else:
+        _find(IMAGE_READERS, path)
+    data = read_bytes(path)
     budget.add_file(len(data))
     with in_memory(path):
-        return _decode(os.fspath(path), decode, data, Path(path).suffix.lower()[1:], budget)
+        return decode_codes(data, os.fspath(path), budget)
 
 
 def read_picture(path: str | os.PathLike[str]) -> ImageData:
@@ -153,14 +159,14 @@ def read_picture(path: str | os.PathLike[str]) -> ImageData:
 
 
 def _picture(path: str | os.PathLike[str]) -> ImageData:
-    decode = _find(IMAGE_READERS, path)
+    _find(IMAGE_READERS, path)
     data, name, extension = read_bytes(path), os.fspath(path), Path(path).suffix.lower()
     whole = ALL_OF_IT.get(extension)
     budget = Budget.of(data)
     found = None if whole is None else _decode(name, whole, data, extension[1:], budget)
     if found is not None:
         return found
-    pixels = _decode(name, decode, data, extension[1:], budget)
+    pixels = decode_codes(data, name, budget)
     if not 1 <= pixels.shape[2] <= 4:
         raise SceneError(f"{name}: has {pixels.shape[2]} channels; a picture has 1 to 4")
     is_coded = pixels.dtype != np.float32
@@ -181,14 +187,38 @@ def three_channels(pixels: NDArray[Any]) -> NDArray[Any]:
 
 
 def decode_codes(data: bytes, name: str, budget: Budget) -> NDArray[Any]:
-    """Return the stored values (H, W, C) of a png or jpg in memory; `name` is for messages."""
-    return _decode(name, coded.decode, data, "png", budget)
+    """Return the stored values (H, W, C) of a picture in memory, uint8, uint16 or float32.
+
+    Of one or two channels the first is gray, of three or four the first three are red, green and blue; the
+    last of two or four is alpha.
+
+    Parameters
+    ----------
+    data
+        The file. Its first bytes say what it is; where they do not, the extension of `name` does.
+    name
+        Of the file, or of its place in another one, for messages.
+    budget
+        What it may take.
+
+    Raises
+    ------
+    SceneError
+        With the name, if it is of another format, damaged, truncated or too large.
+    """
+    extension = Path(name).suffix.lower()
+    decode = IMAGE_READERS.get(extension, raster.decode)
+    if decode in BUILT_IN:
+        decode = next((other for starts, other in SIGNED if data.startswith(starts)), decode)
+    kind = extension[1:] if extension in IMAGE_READERS else "png"
+    return _decode(name, decode, data, kind, budget)
 
 
 def _decode(name: str, decode: Callable[[bytes, Budget], T], data: bytes, kind: str, budget: Budget) -> T:
-    """Return the result of `decode`; its errors name the file."""
+    """Return the result of `decode`; its errors and warnings name the file."""
     try:
-        return decode(data, budget)
+        with collect_warnings() as said:
+            found = decode(data, budget)
     except MemoryError:  # `in_memory` says more
         raise
     except SceneError as error:
@@ -197,6 +227,9 @@ def _decode(name: str, decode: Callable[[bytes, Budget], T], data: bytes, kind: 
     except Exception as error:
         reason = error.__cause__ or error  # imageio hides what is wrong with a file behind its own error
         raise SceneError(f"{name}: not a readable {kind} image: {reason}") from error
+    for message in said:
+        warn_caller(f"{name}: {message}")
+    return found
 
 
 def _find(table: Registry[T], path: str | os.PathLike[str], error: type[SceneError] = SceneError) -> T:
@@ -245,11 +278,15 @@ def _encode_npy(pixels: Floats) -> bytes:
 
 
 def _decode_npy(data: bytes, budget: Budget) -> Floats:
-    pixels = np.load(BytesIO(data), allow_pickle=False)
+    pixels = npz.read_array(data, budget)
     if pixels.ndim not in (2, 3) or pixels.dtype.kind not in "fiub":
         raise SceneError(f"array is {pixels.dtype} of shape {pixels.shape}; an image is (H, W) or (H, W, C)")
     budget.check_size(pixels.shape[0], pixels.shape[1])
     return np.atleast_3d(pixels).astype(np.float32)
+
+
+def _decode_npz(data: bytes, budget: Budget) -> Floats:
+    return npz.decode(data, budget).rgb
 
 
 def _encode_png(picture: ImageData, display: Display, bits: int) -> bytes:
@@ -284,15 +321,29 @@ def _checked_pixels(decode: Callable[[bytes], Any]) -> Decoder:
     return checked
 
 
+READ_ONLY = (".bmp", ".gif", ".tif", ".tiff", ".webp")
+NETPBM = (".pbm", ".pgm", ".ppm", ".pnm", ".pam", ".pfm")
+# the first bytes of files, and what reads them
+SIGNED: tuple[tuple[bytes | tuple[bytes, ...], Decoder], ...] = (
+    (tuple(raster.FORMATS), raster.decode),
+    (pnm.SIGNATURES, pnm.decode),
+    (exr.SIGNATURE, exr.decode),
+    (rgbe.SIGNATURES, rgbe.decode),
+    (b"\x93NUMPY", _decode_npy),
+    (b"PK\3\4", _decode_npz),
+)
+BUILT_IN = {raster.decode_tga, *(decode for _, decode in SIGNED)}
 IMAGE_READERS: Registry[Decoder] = Registry(
     "extension",
     "a function of bytes that returns pixels (H, W, C)",
     {
-        **dict.fromkeys((*coded.EXTENSIONS, ".bmp"), coded.decode),
+        **dict.fromkeys((*coded.EXTENSIONS, *READ_ONLY), raster.decode),
+        ".tga": raster.decode_tga,
+        **dict.fromkeys(NETPBM, pnm.decode),
         ".exr": exr.decode,
         ".hdr": rgbe.decode,
         ".npy": _decode_npy,
-        ".npz": lambda data, budget: npz.decode(data, budget).rgb,
+        ".npz": _decode_npz,
     },
     adapt=_checked_pixels,
 )

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import replace
 from io import BytesIO
 from typing import TYPE_CHECKING, Any
@@ -49,10 +51,16 @@ def decode(data: bytes, budget: Budget | None = None) -> ImageData:
 
 
 def read_arrays(data: bytes, budget: Budget) -> dict[str, NDArray[Any]]:
-    """Return the arrays of an npz file by their names; every header is checked before an array is read."""
+    """Return the arrays of an npz file by their names; every header is checked before an array is read.
+
+    Raises
+    ------
+    SceneError
+        If it is damaged, claims more than it holds, or holds something else than numbers and text.
+    """
     import zipfile
 
-    with zipfile.ZipFile(BytesIO(data)) as archive:
+    with _typed("npz"), zipfile.ZipFile(BytesIO(data)) as archive:
         members = {
             member.filename.removesuffix(".npy"): member for member in checked_members(archive, MAX_ARRAYS)
         }
@@ -64,20 +72,39 @@ def read_arrays(data: bytes, budget: Budget) -> dict[str, NDArray[Any]]:
         return {name: _read(archive, member) for name, member in members.items()}
 
 
-def _shape(archive: zipfile.ZipFile, member: zipfile.ZipInfo) -> tuple[int, ...]:
-    """Return the shape of an array, after checking that its header claims what the archive holds."""
-    with archive.open(member) as packed:
-        return checked_shape(member.filename, packed.read(MAX_HEADER), member.file_size)
-
-
-def checked_shape(name: str, start: bytes, there: int) -> tuple[int, ...]:
-    """Return the shape of an array in the format npy, given its first bytes and its size in bytes.
+def read_array(data: bytes, budget: Budget) -> NDArray[Any]:
+    """Return the array of an npy file, whose header is checked before.
 
     Raises
     ------
     SceneError
-        If its header claims another size, or it holds neither numbers nor text.
+        As `read_arrays`.
     """
+    with _typed("npy"):
+        shape = _checked_shape("array", data[:MAX_HEADER], len(data))
+        budget.charge(f"the array of shape {shape}", 2 * len(data))
+        return np.asarray(np.lib.format.read_array(BytesIO(data), allow_pickle=False))
+
+
+@contextmanager
+def _typed(kind: str) -> Iterator[None]:
+    """Convert the errors of zipfile, zlib and the parser of headers, which are of many types."""
+    try:
+        yield
+    except (MemoryError, SceneError):
+        raise
+    except Exception as error:
+        raise SceneError(f"not a readable {kind} file: {error or type(error).__name__}") from error
+
+
+def _shape(archive: zipfile.ZipFile, member: zipfile.ZipInfo) -> tuple[int, ...]:
+    """Return the shape of an array, after checking that its header claims what the archive holds."""
+    with archive.open(member) as packed:
+        return _checked_shape(member.filename, packed.read(MAX_HEADER), member.file_size)
+
+
+def _checked_shape(name: str, start: bytes, there: int) -> tuple[int, ...]:
+    """Return the shape of an array in the format npy, given its first bytes and its size in bytes."""
     file = BytesIO(start)
     major, _ = np.lib.format.read_magic(file)
     header = {1: np.lib.format.read_array_header_1_0, 2: np.lib.format.read_array_header_2_0}.get(major)

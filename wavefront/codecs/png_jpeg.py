@@ -1,25 +1,20 @@
-"""Pictures of 8 and 16 bits in memory: png and jpg, written and read by imageio.
+"""Pictures of 8 and 16 bits in memory: png and jpg, written by imageio; and the gamma of those that are read.
 
-Pillow has no pictures of 16 bits for each of several channels. It decodes one byte of each number at a time;
-what is written is filtered here.
+Pillow has no pictures of 16 bits for each of several channels; what is written is filtered here.
 Source of the format: W3C, Portable Network Graphics (third edition), 2025.
 """
 
 from __future__ import annotations
 
-import warnings
 import zlib
-from collections.abc import Iterator
-from contextlib import contextmanager
-from io import BytesIO
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ..core.errors import SaveError, SceneError
-from .budget import Budget
-from .size_check import JPG, PNG, check_header
+from ..core.errors import SaveError
+from .raster import quiet
+from .size_check import JPG, PNG
 
 Gamma = float | str  # an exponent, or "srgb" for the exact sRGB curve
 
@@ -27,15 +22,11 @@ GAMMAS = (0.01, 100.0)  # the least and the largest exponent
 PNG_DEFLATE = zlib.Z_RLE  # run lengths only: for renders 3 % larger files in a fourth of the time
 COLOR_TYPES = {3: 2, 4: 6}  # of a png, by channels
 FILTER_UP = 2  # filter of a row of a png: differences from the row above
-BITS, COLOR_TYPE = 24, 25  # where the header of a png has them
 EXTENSIONS = (".png", ".jpg", ".jpeg")
 MAX_JPG = 65500  # pixels in a row or a column, by libjpeg
 SRGB_GAMA = 45455  # gAMA of an sRGB png, for readers that do not know the sRGB chunk
 EXIF_IFD, COLOR_SPACE, EXIF_GAMMA = 0x8769, 0xA001, 0xA500  # tags of CIPA DC-008 (Exif 2.32)
 SRGB_SPACE, UNCALIBRATED = 1, 0xFFFF  # values of ColorSpace
-FILLER = bytes([0x5A]) * 64  # entropy-coded bytes that decode to pixels
-GREY = 128  # libjpeg's pixel value where data ends early
-ROUNDING = 2  # largest error of a gray after color interpolation, in codes
 
 
 def encode(codes: NDArray[Any], extension: str, gamma: Gamma) -> bytes:
@@ -59,29 +50,12 @@ def encode(codes: NDArray[Any], extension: str, gamma: Gamma) -> bytes:
     return bytes(iio.imwrite("<bytes>", codes, extension=".jpg", plugin="pillow", **options))
 
 
-def decode(data: bytes, budget: Budget | None = None) -> NDArray[Any]:
-    """Return the codes (H, W, C) of a png or jpg, uint8 or uint16.
-
-    Raises
-    ------
-    SceneError
-        If the file claims more than it holds, ends early, or holds other kinds of numbers.
-    """
-    check_header(data, budget or Budget.of(data))
-    codes = _decode(data)
-    if data.startswith(JPG) and _ends_early(data, codes):
-        raise SceneError("ends early: its last pixels are missing")
-    if codes.dtype == np.bool_:
-        codes = codes * np.uint8(255)
-    if codes.dtype not in (np.uint8, np.uint16):
-        raise SceneError(f"holds {codes.dtype} values; only 8 and 16 bits are read")
-    return np.atleast_3d(codes)
-
-
 def gamma_of(data: bytes) -> Gamma:
-    """Return the gamma of a png or jpg, "srgb" if the file has none."""
+    """Return the gamma of a png or jpg, "srgb" for files that have none, or of another format."""
+    if not data.startswith((PNG, JPG)):
+        return "srgb"
     try:
-        with _quiet():
+        with quiet():
             exponent = _exponent(data)
     # the reader raises exceptions of any type on damaged Exif data, which some cameras and editors write
     except Exception:
@@ -142,19 +116,6 @@ def _encode_16(codes: NDArray[np.uint16], gamma: Gamma) -> bytes:
     )
 
 
-def _decode_16(data: bytes) -> NDArray[np.uint16]:
-    """Return the codes (H, W, 3 or 4) of a png."""
-    from PIL import Image
-
-    halves: list[NDArray[np.uint16]] = []
-    for order in "BL":  # the high byte of each number, then the low one
-        with Image.open(BytesIO(data), formats=["PNG"]) as image:
-            *tile, mode = image.tile[0]
-            image.tile = [(*tile, f"{mode}"[:-1] + order)]  # type: ignore[list-item]
-            halves.append(np.asarray(image).astype(np.uint16))
-    return halves[0] * np.uint16(256) + halves[1]
-
-
 def _exif(gamma: Gamma) -> bytes:
     from PIL.Image import Exif
     from PIL.TiffImagePlugin import IFDRational
@@ -165,34 +126,3 @@ def _exif(gamma: Gamma) -> bytes:
     if gamma != "srgb":
         tags[EXIF_GAMMA] = IFDRational(round(float(gamma) * 100000), 100000)
     return exif.tobytes()
-
-
-def _decode(data: bytes) -> NDArray[Any]:
-    import imageio.v3 as iio
-
-    with _quiet():
-        if data.startswith(PNG) and data[BITS] == 16 and data[COLOR_TYPE] in COLOR_TYPES.values():
-            return _decode_16(data)
-        return np.asarray(iio.imread(data, plugin="pillow", index=0))
-
-
-@contextmanager
-def _quiet() -> Iterator[None]:
-    """Suppress the decoder's warnings of large images, which have another limit here, and of Exif data."""
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore")
-        yield
-
-
-def _ends_early(data: bytes, codes: NDArray[Any]) -> bool:
-    """Return whether the pixels of a jpg end before its picture does.
-
-    The decoder fills missing pixels with gray. If the last pixel is gray, data is appended and decoded again:
-    pixels that change were missing.
-    """
-    last = codes[-1, -1].astype(np.float64)
-    luma = last @ (0.299, 0.587, 0.114) if last.shape == (3,) else last.mean()
-    end = data.rfind(b"\xff\xd9")
-    if abs(luma - GREY) > ROUNDING or end < 0:
-        return False
-    return not np.array_equal(_decode(data[:end] + FILLER + data[end:]), codes)

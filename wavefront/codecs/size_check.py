@@ -17,6 +17,7 @@ PNG = b"\x89PNG\r\n\x1a\n"
 JPG = b"\xff\xd8"
 BMP = b"BM"
 PNG_CHANNELS = {0: 1, 2: 3, 3: 1, 4: 2, 6: 4}  # by color type
+BITS, COLOR_TYPE = 24, 25  # where the header of a png has them
 PALETTE = 3  # the color type of indices, which become up to four channels
 ADAM7 = ((0, 0, 8, 8), (4, 0, 8, 8), (0, 4, 4, 8), (2, 0, 4, 4), (0, 2, 2, 4), (1, 0, 2, 2), (0, 1, 1, 2))
 JPG_PIXELS_PER_BYTE = 512  # at most: a block of 8 × 8 pixels takes at least a bit
@@ -37,10 +38,8 @@ def check_header(data: bytes, budget: Budget) -> None:
         _check_png(data, budget)
     elif data.startswith(JPG):
         _check_jpg(data, budget)
-    elif data.startswith(BMP):
-        _check_bmp(data, budget)
     else:
-        raise SceneError("not a readable png or jpg image: its header is damaged")
+        _check_bmp(data, budget)
 
 
 def _check_bmp(data: bytes, budget: Budget) -> None:
@@ -63,12 +62,13 @@ def _check_png(data: bytes, budget: Budget) -> None:
         raise SceneError("not a readable png image: its header is damaged")
     width, height = int.from_bytes(header[:4], "big"), int.from_bytes(header[4:8], "big")
     budget.check_size(height, width)
-    item, channels = (2 if header[8] == 16 else 1), max(PNG_CHANNELS[header[9]], 4 * (header[9] == PALETTE))
+    item, channels = (2 if header[8] == 16 else 1), PNG_CHANNELS[header[9]] + 1  # it may get alpha
+    channels = 4 if header[9] == PALETTE else min(channels, 4)
     copies = 4 if item == 2 and channels > 1 else 2  # 16 bits of several channels are decoded in two halves
     budget.charge(f"a picture of {width} × {height} pixels", height * width * channels * item * copies)
     bits, interlaced = header[8] * PNG_CHANNELS[header[9]], header[12] == 1
     need = sum(rows * (1 + (columns * bits + 7) // 8) for columns, rows in _passes(width, height, interlaced))
-    pixels = [(content, check) for name, content, check in _png_chunks(data) if name == b"IDAT"]
+    pixels = [(content, check) for name, content, check in png_chunks(data) if name == b"IDAT"]
     there = _inflated((content for content, _ in pixels), need)
     if there < need:
         raise SceneError(f"ends early: {width} × {height} pixels take {need} bytes; {there} are there")
@@ -84,7 +84,7 @@ def _passes(width: int, height: int, interlaced: bool) -> Iterator[tuple[int, in
             yield columns, rows
 
 
-def _png_chunks(data: bytes) -> Iterator[tuple[bytes, memoryview, int]]:
+def png_chunks(data: bytes) -> Iterator[tuple[bytes, memoryview, int]]:
     """Yield the name, the content and the checksum of each chunk of a png."""
     view, at = memoryview(data), len(PNG)
     while at + 8 <= len(data):
@@ -107,14 +107,16 @@ def _inflated(pieces: Iterable[memoryview], need: int) -> int:
 
 def _check_jpg(data: bytes, budget: Budget) -> None:
     at = len(JPG)
-    while at + 9 <= len(data) and data[at] == 0xFF:
+    while at + 10 <= len(data) and data[at] == 0xFF:
         marker, length = data[at + 1], int.from_bytes(data[at + 2 : at + 4], "big")
         if 0xC0 <= marker <= 0xCF and marker not in (0xC4, 0xC8, 0xCC):  # a start of frame
             height, width = (int.from_bytes(data[at + k : at + k + 2], "big") for k in (5, 7))
             budget.check_size(height, width)
             if height * width > JPG_PIXELS_PER_BYTE * (len(data) - at):
                 raise SceneError(f"ends early: {len(data) - at} bytes cannot hold {width} × {height} pixels")
-            budget.charge(f"a picture of {width} × {height} pixels", height * width * 3 * 2)
+            budget.charge(
+                f"a picture of {width} × {height} pixels", height * width * max(3, data[at + 9]) * 2
+            )
             return
         at += 1 if marker == 0xFF else 2 + length
     raise SceneError("not a readable jpg image: its header is damaged")

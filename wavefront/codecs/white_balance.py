@@ -7,6 +7,7 @@ from numpy.typing import ArrayLike
 
 from ..arrays.vec import Doubles
 from ..colors import rgb
+from ..colors.primaries import BRADFORD
 from ..core.errors import SceneError, as_array, number
 
 WhiteBalance = float | ArrayLike  # kelvin, or the linear RGB of something that is gray
@@ -19,9 +20,6 @@ XYZ_OF_RGB = np.array(  # linear sRGB to CIE XYZ, IEC 61966-2-1
         [0.2126729, 0.7151522, 0.0721750],
         [0.0193339, 0.1191920, 0.9503041],
     ]
-)
-BRADFORD = np.array(  # CIE XYZ to the responses of cones
-    [[0.8951, 0.2664, -0.1614], [-0.7502, 1.7135, 0.0367], [0.0389, -0.0685, 1.0296]]
 )
 
 

@@ -4,16 +4,14 @@ from __future__ import annotations
 
 import math
 import struct
-import zipfile
 from collections.abc import Callable
-from io import BytesIO
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ..arrays.vec import Doubles, Floats, f4
 from ..codecs.budget import Budget
-from ..codecs.npz import MAX_HEADER, checked_shape, read_arrays
+from ..codecs.npz import read_array, read_arrays
 from ..core.errors import SceneError, one_of
 from ..core.files import extension_of, path_name, read_bytes
 from .sources import LoadLimits, PathLike, checked_limits
@@ -70,7 +68,7 @@ def parsed_grid(path: str, data: bytes, budget: Budget, name: str | None = None)
     """Return the grid of a file that has been read; see `load_grid`."""
     try:
         return _reader(path)(path, data, budget, name)
-    except (SceneError, ValueError, OSError, zipfile.BadZipFile) as error:
+    except (SceneError, ValueError, OSError) as error:
         raise SceneError(f"{path}: {error}") from error
 
 
@@ -83,8 +81,7 @@ def _reader(path: PathLike) -> Callable[[str, bytes, Budget, str | None], tuple[
 
 def _npy(path: str, data: bytes, budget: Budget, name: str | None) -> tuple[Floats, Doubles]:
     """Return the array of a file."""
-    budget.charge("the array", 2 * math.prod(checked_shape("array", data[:MAX_HEADER], len(data))) * 4)
-    return _as_grid(np.lib.format.read_array(BytesIO(data), allow_pickle=False)), np.eye(4)
+    return _as_grid(read_array(data, budget)), np.eye(4)
 
 
 def _npz(path: str, data: bytes, budget: Budget, name: str | None) -> tuple[Floats, Doubles]:

@@ -25,6 +25,7 @@ Wrap: TypeAlias = Literal["repeat", "mirror", "clamp"]
 Channel: TypeAlias = int | Literal["luminance"]
 UV_SETS = ("uv", "uv1")  # fields of `SurfaceInteraction`
 
+ONE = -1  # in place of a stored channel: alpha of a picture that has none
 CHUNK = 1 << 20  # texels that are read at a time
 
 
@@ -37,8 +38,9 @@ class Texture(BaseTexture):
     Parameters
     ----------
     source
-        A file (png, jpg, exr, hdr, npy), or an array (H, W), (H, W, C), top row first: uint8 and
-        uint16 are scaled to [0, 1], floats are used unchanged. An array is shared, not copied.
+        A file (png, jpg, bmp, gif, tga, tif, webp, ppm, pfm, exr, hdr, npy), or an array (H, W), (H, W, C),
+        top row first: uint8 and uint16 are scaled to [0, 1], floats are used unchanged. An array is shared,
+        not copied.
     srgb
         Decode 8- and 16-bit colors from sRGB. False for data such as roughness. Alpha is never
         decoded, and float images are linear already.
@@ -50,7 +52,8 @@ class Texture(BaseTexture):
         (3, 3) matrix applied to (u, v, 1) first.
     channel
         Which channel to use as a number, from 0, or "luminance". None gives a color: the first
-        three channels, or the first where there are one or two.
+        three channels, or the first where there are one or two. Files of pictures have red, green, blue and
+        alpha, 0 to 3, whatever they store: gray counts as all three colors, and alpha that is missing as 1.
     scale, offset
         One number, or three for a color.
     uv_set
@@ -85,11 +88,14 @@ class Texture(BaseTexture):
         uv_set: Literal[0, 1] = 0,
         max_pixels: int = MAX_PIXELS,
     ) -> None:
-        codes, self.name = _codes(source, max_pixels)
+        codes, self.name, is_picture = _codes(source, max_pixels)
         self.size = (codes.shape[1], codes.shape[0])  # (width, height)
         self.channels = self._stride = codes.shape[2]  # of the image
+        self.has_alpha = self.channels in (2, 4)
         self._texels = codes.reshape(-1)  # not as float32: 8-bit images take a quarter of the memory
-        self._channels = _pick(self.name, channel, self._stride)
+        if is_picture and channel in (0, 1, 2, 3):
+            channel = _stored(channel, self._stride)
+        self._channels = (ONE,) if channel == ONE else _pick(self.name, channel, self._stride)
         self._tables = [_table(codes.dtype, srgb and not _is_alpha(c, self._stride)) for c in self._channels]
         self.srgb = srgb and codes.dtype.kind == "u"
         self._gray = channel == "luminance"
@@ -201,6 +207,8 @@ class Texture(BaseTexture):
 
     def _values(self, first: Ints, k: int) -> Floats:
         """Return the same of texels given by where their first channel is stored."""
+        if self._channels[k] == ONE:
+            return np.ones(first.shape, f4)
         # "wrap" is twice as fast as the default, which checks each index
         codes = self._texels[self._channels[k] :].take(first, mode="wrap")
         table = self._tables[k]
@@ -208,20 +216,27 @@ class Texture(BaseTexture):
 
 
 class StoredImage(NamedTuple):
-    """An image file that has been read."""
+    """A file of a picture that has been read: gray or RGB, with alpha or without."""
 
     codes: NDArray[Any]  # (H, W, C) as stored
     name: str
 
 
-def _codes(source: Any, max_pixels: int) -> tuple[NDArray[Any], str]:
-    """Return texels (H, W, C) as uint8 or float32, and a name for messages."""
+def _codes(source: Any, max_pixels: int) -> tuple[NDArray[Any], str, bool]:
+    """Return texels (H, W, C) as uint8 or float32, a name for messages, and whether they are of a picture."""
+    is_picture = isinstance(source, StoredImage)
     if isinstance(source, StoredImage):
         codes, name = source
     elif isinstance(source, str | os.PathLike):
         codes, name = read_codes(source, Budget(max_pixels)), Path(source).name
+        is_picture = not name.endswith(".npy")
     else:
         codes, name = as_array("image array", source), "array"
+    return _checked(codes, name), name, is_picture
+
+
+def _checked(codes: NDArray[Any], name: str) -> NDArray[Any]:
+    """Return texels (H, W, C) as uint8, uint16 or float32."""
     if codes.ndim == 2:
         codes = codes[:, :, None]
     if codes.ndim != 3 or not 1 <= codes.shape[2] <= 4 or codes.dtype.kind not in "uifb":
@@ -230,7 +245,7 @@ def _codes(source: Any, max_pixels: int) -> tuple[NDArray[Any], str]:
         )
     check_size(codes.shape[0], codes.shape[1], math.inf)  # an array may have any size
     if codes.dtype in (np.uint8, np.uint16):
-        return np.ascontiguousarray(codes), name
+        return np.ascontiguousarray(codes)
     if codes.dtype.kind in "ui":
         raise SceneError(f"texture {name!r} is {codes.dtype}; it must be uint8, uint16 or float")
     codes = np.ascontiguousarray(codes, np.float32)
@@ -241,7 +256,14 @@ def _codes(source: Any, max_pixels: int) -> tuple[NDArray[Any], str]:
             f"texture {name!r} has {plural(len(bad), 'value that is', 'values that are')} not finite, "
             f"first: row {row}, column {column}"
         )
-    return codes, name
+    return codes
+
+
+def _stored(channel: int, there: int) -> int:
+    """Return the stored channel of one of red, green, blue and alpha; `ONE` for alpha that is not stored."""
+    if channel == 3:
+        return there - 1 if there in (2, 4) else ONE
+    return channel if there > 2 else 0
 
 
 def _pick(name: str, channel: Channel | None, there: int) -> tuple[int, ...]:
