@@ -22,7 +22,7 @@ POINTS = np.random.default_rng(1).random((2, 40), np.float32)
 def one(tmp_path):
     """Load a textured triangle whose material has the given lines, beside an image `t.png`."""
     iio.imwrite(tmp_path / "t.png", CODES)
-    (tmp_path / "t.tga").write_bytes(bytes(100))
+    (tmp_path / "t.psd").write_bytes(bytes(100))
     (tmp_path / "broken.png").write_bytes((tmp_path / "t.png").read_bytes()[:60])
 
     def load_one(*lines, **arguments):
@@ -85,8 +85,7 @@ def test_options_without_effect_are_named(one):
         ("map_Kd -s 2", r"line 2: map_Kd names no file"),
         ("map_Kd -mm a b t.png", r"line \d+: map_Kd: -mm is 'a b'; it must be numbers"),
         ("map_Pr -imfchan q t.png", r"line \d+: map_Pr: -imfchan is 'q'; it must be one of r, g, b, m, l"),
-        ("map_Pr -imfchan m t.png", r"line 2: map_Pr: channel is 3"),
-        ("map_Kd t.tga", r"line 2: map_Kd: .*t\.tga: extension is '\.tga'; it must be one of"),
+        ("map_Kd t.psd", r"line 2: map_Kd: .*t\.psd: extension is '\.psd'; it must be one of"),
         ("map_Kd ../t.png", r"line 2: map_Kd: .*s\.mtl: refers to '\.\./t\.png'"),
         ("map_Kd broken.png", r"s\.mtl line 2: map_Kd: .*broken\.png"),
         ("map_Kd C:\\t.png", r"absolute path is not followed"),

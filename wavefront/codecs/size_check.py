@@ -62,8 +62,8 @@ def _check_png(data: bytes, budget: Budget) -> None:
         raise SceneError("not a readable png image: its header is damaged")
     width, height = int.from_bytes(header[:4], "big"), int.from_bytes(header[4:8], "big")
     budget.check_size(height, width)
-    item, channels = (2 if header[8] == 16 else 1), PNG_CHANNELS[header[9]] + 1  # it may get alpha
-    channels = 4 if header[9] == PALETTE else min(channels, 4)
+    item, channels = (2 if header[8] == 16 else 1), max(PNG_CHANNELS[header[9]], 4 * (header[9] == PALETTE))
+    channels += any(name == b"tRNS" for name, _, _ in png_chunks(data)) and channels in (1, 3)  # alpha
     copies = 4 if item == 2 and channels > 1 else 2  # 16 bits of several channels are decoded in two halves
     budget.charge(f"a picture of {width} × {height} pixels", height * width * channels * item * copies)
     bits, interlaced = header[8] * PNG_CHANNELS[header[9]], header[12] == 1
