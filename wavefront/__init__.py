@@ -28,7 +28,7 @@ from .bsdfs import (
     ThinDisney,
 )
 from .camera import Camera
-from .colors import exposure, from_photometric, srgb, to_photometric
+from .colors import blackbody, exposure, from_photometric, srgb, to_photometric
 from .core.errors import Interrupted, RenderError, SaveError, SceneError
 from .core.html import register_preview
 from .core.suggestions import did_you_mean
@@ -246,6 +246,7 @@ __all__ = [
     "Viewer",
     "Weather",
     "Year",
+    "blackbody",
     "compare",
     "daylight_coefficients",
     "elementary",
@@ -296,7 +297,7 @@ def __getattr__(name: str) -> Any:
         if name in names:
             found = import_module(module, __name__)
             return found if name == "testing" else getattr(found, name)
-    hint = did_you_mean(name, __all__) if not name.startswith("_") else ""
+    hint = did_you_mean(name, __all__, (__name__,)) if not name.startswith("_") else ""
     raise AttributeError(f"module {__name__!r} has no attribute {name!r}{hint}")
 
 

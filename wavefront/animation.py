@@ -16,11 +16,13 @@ from .codecs.images import check_writable
 from .codecs.white_balance import WhiteBalance
 from .core.errors import SaveError, SceneError, number
 from .core.files import check_target, extension_of, path_name, write_bytes
+from .core.suggestions import suggests_keywords
 from .image import Image
 
 ANIMATIONS = (".gif", ".png", ".mp4")
 
 
+@suggests_keywords
 def save_animation(
     path: str | os.PathLike[str],
     images: Iterable[Image],

@@ -7,9 +7,10 @@ from typing import Any, Unpack
 
 from numpy.typing import ArrayLike
 
-from .camera import Camera
+from .camera import Camera, ImageSize
 from .camera.moves import orbit
 from .core.errors import SceneError, iterable
+from .core.suggestions import suggests_keywords
 from .image import Image
 from .io.to_scene import as_scene, choose_camera
 from .session import Session
@@ -67,11 +68,12 @@ def render_many(
             yield session.run()
 
 
+@suggests_keywords
 def turntable(
     scene: Any,
     n: int = 60,
     *,
-    size: tuple[int, int] | None = None,
+    size: ImageSize | None = None,
     up: ArrayLike = "auto",
     view: str | ArrayLike | None = None,
     fov: float | None = None,

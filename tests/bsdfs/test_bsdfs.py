@@ -305,7 +305,7 @@ BAD = {
     Mirror: {"reflectance": [2]},
     Dielectric: {
         "ior": [(ior, "more than 0") for ior in (0, -1.5, np.inf)]
-        + [("glass", "number"), *((ior, "from 1e-06 to 1e+06") for ior in (1e30, 1e-30))],
+        + [("glas", "must be one of acetone"), *((ior, "from 1e-06 to 1e+06") for ior in (1e30, 1e-30))],
         "roughness": [-0.1],
         "reflectance": [-1],
         "transmittance": [3],

@@ -97,11 +97,11 @@ BAD = {
     "size negative": ({"size": (5, -1)}, r"size is \(5, -1\); both must be"),
     "size too large": ({"size": (5, 65537)}, r"size is \(5, 65537\); both must be"),
     "size fraction": ({"size": (5, 1.5)}, r"size is \(5, 1.5\); both must be"),
-    "size one number": ({"size": 5}, r"size must be \(width, height\), got 5"),
+    "size a text": ({"size": "640x480"}, r"size must be \(width, height\) or one number for both, got '640"),
     "size three numbers": ({"size": (5, 5, 3)}, r"size must be \(width, height\)"),
     "size text": ({"size": "5x"}, r"size is '5x'; both must be"),
     "size NaN": ({"size": (np.nan, 5)}, r"size must be \(width, height\)"),
-    "size infinite": ({"size": (np.inf, 5)}, r"size must be \(width, height\), got \(inf, 5\)"),
+    "size infinite": ({"size": (np.inf, 5)}, r"size must be \(width, height\) or one number for both, got \(inf, 5\)"),
 }
 
 

@@ -119,7 +119,7 @@ def wf_parameters(kind: type) -> list[str]:
         (wf.DirectionalLight((0, 0, 1), 1), "angle", -3, r"DirectionalLight angle is -3"),
         (wf.Environment(), "radiance", -1, r"Environment radiance is -1; it must be at least 0"),
         (wf.Sphere((0, 0, 0), 1, name="sun"), "emission", -1, r"sun: emission is -1"),
-        (wf.Sphere((0, 0, 0), 1, name="sun"), "material", "red", r"sun: material is 'red', a color"),
+        (wf.Sphere((0, 0, 0), 1, name="sun"), "material", "reed", r"sun: material is 'reed'; it must be one of"),
         (wf.Mesh(np.eye(3), [[0, 1, 2]], name="roof"), "emission", "x", r"roof: emission is 'x'"),
         (wf.Mesh(np.eye(3), [[0, 1, 2]], name="roof"), "material", 1, r"roof: material must be a material"),
     ],
@@ -329,7 +329,7 @@ def test_constructors_are_made_of_the_parameters():
     assert signature.parameters["roughness"].annotation == "Scalar"
     assert signature.parameters["film_ior"].default == wf.Dielectric.defaults["film_ior"] == 1.33
     assert get_type_hints(wf.Conductor.__init__)["distribution"] == Literal["ggx", "beckmann"]
-    with pytest.raises(TypeError, match=r"Conductor.__init__\(\) missing .* 'eta' and 'k'"):
+    with pytest.raises(TypeError, match=r"Conductor.__init__\(\) missing .* 'eta'"):
         wf.Conductor()
     with pytest.raises(TypeError, match=r"Principled\(\) got .* 'specular_weight'; did you mean 'specular'"):
         wf.Principled(specular_weight=1)

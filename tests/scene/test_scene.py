@@ -48,7 +48,7 @@ BAD = [
     (wf.Mesh, TRIANGLE, {"emission": -1}, r"mesh: emission is -1; it must be at least 0"),
     (wf.Mesh, TRIANGLE, {"emission": (1, 2, NAN)}, r"mesh: emission\[2\] is nan"),
     (wf.Mesh, TRIANGLE, {"emission": (1, 2)}, r"mesh: emission must have shape \(3,\), got \(2,\)"),
-    (wf.Mesh, TRIANGLE, {"material": "red"}, r"mesh: material is 'red', a color and no material; wf.Diffuse\('red'\)"),
+    (wf.Mesh, TRIANGLE, {"material": "reed"}, r"mesh: material is 'reed'; it must be one of aluminum"),
     (wf.Mesh, TRIANGLE, {"material": wf.Diffuse}, r"mesh: material must be a material"),
     (wf.Mesh, TRIANGLE, {"vertices": [[0, 0, NAN]] * 3, "name": "roof"}, r"roof: vertices\[0\]\[2\] is nan"),
     (wf.Rectangle, SQUARE, {"corner": (0, 0)}, r"rectangle: corner must have shape \(3,\), got \(2,\)"),

@@ -123,20 +123,42 @@ def test_rounding_is_no_difference() -> None:
     assert wf.compare(a, flat(0.51)).p_pixels < 1e-3
 
 
-def test_pictures_that_share_samples_are_refused() -> None:
+def test_of_pictures_that_share_samples_the_text_says_so() -> None:
+    """Equal ones have p-values of 1, and others cautious ones."""
     scene = wf.Scene([wf.Sphere((0, 0, 0), 1)], [wf.Environment(1)])
     a, same, more = (render(scene, spp, size=(8, 8)) for spp in (4, 4, 8))
     other = render(scene, 4, size=(8, 8), seed=1)
+    assert levels(wf.compare(a, same)) == (1,) * 4
     for b, last in ((same, 3), (more, 3), (a * 1.01, 3)):
         found = wf.compare(a, b)
-        assert levels(found) == (None,) * 4
-        assert f"share samples 0 to {last} of seed 0" in found.p_absent
-        assert found.p_absent in str(found)
-        assert found.rmse >= 0
+        assert found.p_absent == ""
+        assert 1e-3 < found.p_value <= 1
+        assert f"share samples 0 to {last} of seed 0" in found.shared
+        assert found.shared in str(found)
     assert wf.compare(a, other).p_value > 1e-3
     more.metadata["sample_ranges"] = [[4, 8]]
-    assert wf.compare(a, more).p_absent == ""
-    assert wf.compare(a, render(scene, 4, size=(8, 8), sampler="independent")).p_absent == ""
+    assert wf.compare(a, more).shared == ""
+    assert wf.compare(a, render(scene, 4, size=(8, 8), sampler="independent")).shared == ""
+
+
+def test_errors_in_common_add_up_at_worst() -> None:
+    """Opposite errors, the worst that pictures can have in common, give no more alarms than p says."""
+    rng, alarms = np.random.default_rng(5), []
+    for _ in range(80):
+        a = noisy(rng, gaussian, size=8)
+        a.metadata.update(seed=1, sampler="sobol", spp=a.spp)
+        b = a * 1
+        b.rgb, b.standard_error, b.variance, b.counts = 6 - a.rgb, a.standard_error, a.variance, a.counts
+        found = wf.compare(a, b)
+        assert found.shared
+        alarms.append(found.p_mean < 0.05)
+    assert sum(alarms) <= most(80, 0.05)
+
+
+@pytest.mark.parametrize("pixels", [np.full((4, 4, 3), 0.5), np.zeros((4, 4))])
+def test_equal_pictures_differ_by_nothing(pixels) -> None:
+    """Also where nothing is known of their errors."""
+    assert levels(wf.compare(pixels, pixels.copy())) == (1,) * 4
 
 
 @pytest.mark.parametrize(
@@ -165,8 +187,8 @@ def test_shared_samples(a, b, shared) -> None:
 
 def test_reasons() -> None:
     image = noisy(np.random.default_rng(0), gaussian)
-    assert "b has no standard error" in wf.compare(image, image.rgb).p_absent
-    assert "a has no standard error" in wf.compare(image.rgb, image).p_absent
+    assert "b has no standard error" in wf.compare(image, 2 * image.rgb).p_absent
+    assert "a has no standard error" in wf.compare(2 * image.rgb, image).p_absent
     once = noisy(np.random.default_rng(0), gaussian, spp=1)
     assert "b has pixels with fewer than two samples" in wf.compare(image, once).p_absent
 

@@ -1,5 +1,7 @@
 """The checks themselves: their statistics, and that they catch errors of one percent."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 import scenes
@@ -376,3 +378,39 @@ def test_wrong_inverse_is_caught():
         testing.check_warp(
             warp.uniform_sphere, warp.uniform_sphere_pdf, warp.cosine_hemisphere_inverse, samples=50_000
         )
+
+
+@pytest.mark.parametrize("field", ["wi", "distance", "radiance", "pdf"])
+def test_check_light_checks_types(field: str) -> None:
+    """Embree, for one, takes no float64."""
+
+    class Wide(ConstantEnvironment):
+        def sample_li(self, points, u):
+            drawn = super().sample_li(points, u)
+            return replace(drawn, **{field: getattr(drawn, field).astype(np.float64)})
+
+    with pytest.raises(AssertionError, match=rf"shape and type of sample_li\(\)\.{field} .*float64"):
+        testing.check_light(Wide(np.ones((3, 1), F4)), samples=1000)
+
+
+@pytest.mark.parametrize("method", ["pdf_li", "le"])
+def test_check_light_checks_types_of_methods(method: str) -> None:
+    class Wide(ConstantEnvironment):
+        def pdf_li(self, points, wi):
+            return super().pdf_li(points, wi).astype(np.float64 if method == "pdf_li" else F4)
+
+        def le(self, wi, surface=None):
+            return super().le(wi, surface).astype(np.float64 if method == "le" else F4)
+
+    with pytest.raises(AssertionError, match=rf"shape and type of {method}\(\) .*float64"):
+        testing.check_light(Wide(np.ones((3, 1), F4)), samples=1000)
+
+
+def test_check_bsdf_checks_the_type_of_eta() -> None:
+    class Wide(Dielectric):
+        def sample_f(self, wo, u):
+            drawn = super().sample_f(wo, u)
+            return replace(drawn, eta=drawn.eta.astype(np.float64))
+
+    with pytest.raises(AssertionError, match=r"shape and type of eta .*float64"):
+        testing.check_bsdf(Wide(1.5, 0.3), samples=1000)

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from copy import copy
-from typing import TYPE_CHECKING, Any, ClassVar, Self
+from typing import Any, ClassVar, Self
 
 import numpy as np
 
@@ -19,7 +19,6 @@ from ..arrays.vec import Bools, Floats, broadcast
 from ..core.errors import SceneError
 from ..core.html import preview_html
 from ..core.parameter import Parametrized, instance_of
-from ..core.suggestions import MATERIAL_ARGUMENTS
 from ..sampling.warp import cosine_hemisphere, cosine_hemisphere_pdf
 from ..textures.base import BaseTexture
 
@@ -72,17 +71,8 @@ class Bsdf(Parametrized, ABC):
     catches_shadows: bool = False  # the camera sees only shadows on it
     dimensions: int = 2  # rows of u that sample_f reads
     indices: ClassVar[tuple[str, ...]] = ()  # parameters that are indices of refraction of what it encloses
-    given_elsewhere: ClassVar[dict[str, str]] = MATERIAL_ARGUMENTS  # for messages
     specular: bool = False  # every lobe is a delta: f and pdf are 0, light sampling is skipped
     back_facing: Bools | None = None  # (n,) wo is on the back, for some that are bound; unbound, on the front
-
-    if not TYPE_CHECKING:  # a type checker would take every name for an attribute
-
-        def __getattr__(self, name: str) -> Any:
-            """Raise an AttributeError, which says what to write for what belongs to a `Material`."""
-            hint = f"; write {self.given_elsewhere[name]}" if name in self.given_elsewhere else ""
-            text = f"{type(self).__name__!r} object has no attribute {name!r}{hint}"
-            raise AttributeError(text, name=name, obj=self)
 
     def _repr_html_(self) -> str:
         """Show a ball in a notebook."""

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from functools import partial
-from typing import Self
+from typing import Any, Self
 
 import numpy as np
 
 from ..arrays.vec import Floats, broadcast, f4
-from ..core.errors import one_of
+from ..colors import rgb
+from ..core.errors import SceneError, in_brief, one_of
 from ..core.parameter import Parameter, parametrized
 from ..core.suggestions import suggests_keywords
 from ..textures.base import BaseTexture
@@ -40,6 +41,41 @@ METALS = {
 SPELLINGS = {"aluminium": "aluminum", "chrome": "chromium"}
 
 
+def _metal(title: str, name: Any) -> Any:
+    """Return the name of a metal as it is in the table."""
+    key = name.lower() if isinstance(name, str) else name
+    return one_of(title, SPELLINGS.get(key, key), METALS)
+
+
+class _Eta(Parameter[Color]):
+    """The parameter η; the name of a metal sets k, too."""
+
+    def __set__(self, instance: Any, value: Color) -> None:
+        """Store η, or both of a metal."""
+        if isinstance(value, str):
+            value, k = METALS[_metal("Conductor eta", value)]
+            vars(instance)["_named"] = "eta" not in vars(instance)  # in the constructor, which assigns k next
+            vars(instance)["k"] = rgb("Conductor k", k)
+        super().__set__(instance, value)
+
+
+class _Extinction(Parameter[Color | None]):
+    """The parameter k, which a metal that is given by its name has already."""
+
+    def __set__(self, instance: Any, value: Color | None) -> None:
+        """Store k, unless there is that of a metal."""
+        if not vars(instance).pop("_named", False):
+            if value is None:
+                raise SceneError(
+                    'Conductor k is missing: give eta and k, or the name of a metal, such as "gold"'
+                )
+            super().__set__(instance, value)
+        elif value is not None:
+            raise SceneError(
+                f"Conductor k is {in_brief(value)}, and a named metal has its own; or is it roughness=...?"
+            )
+
+
 @parametrized
 class Conductor(RoughBsdf):
     """A metal, by its complex refractive index η + ik: smooth, or rough.
@@ -50,7 +86,8 @@ class Conductor(RoughBsdf):
     Parameters
     ----------
     eta
-        Real part η per channel, more than 0 and at most 1e6: a number, three numbers, or a texture.
+        Real part η per channel, more than 0 and at most 1e6: a number, three numbers, or a texture; or the
+        name of a metal, as for `named`, which also has a k.
     k
         Imaginary part (extinction) per channel, in [0, 1e6].
     roughness
@@ -79,12 +116,12 @@ class Conductor(RoughBsdf):
 
     Examples
     --------
-    >>> gold = wf.Conductor.named("gold", roughness=0.3)
+    >>> gold = wf.Conductor("gold", roughness=0.3)
     >>> metal = wf.Conductor(eta=(1.5, 1.0, 0.6), k=(7.6, 6.6, 5.4))
     """
 
-    eta: Parameter[Color] = Parameter(partial(color, high=MAX_INDEX, above_zero=True))
-    k: Parameter[Color] = Parameter(partial(color, high=MAX_INDEX))
+    eta: Parameter[Color] = _Eta(partial(color, high=MAX_INDEX, above_zero=True))
+    k: Parameter[Color | None] = _Extinction(partial(color, high=MAX_INDEX), default=None)
     roughness: Parameter[Scalar] = Parameter(scalar, default=0.0)
     film_thickness: Parameter[Scalar] = Parameter(thickness, default=0.0, kw_only=True)
     film_ior: Parameter[Scalar] = Parameter(refractive_index, default=1.33, kw_only=True)
@@ -109,8 +146,7 @@ class Conductor(RoughBsdf):
         SceneError
             If the name is not known, listing those that are.
         """
-        key = name.lower() if isinstance(name, str) else name
-        return cls(*METALS[one_of("Conductor name", SPELLINGS.get(key, key), METALS)], roughness)
+        return cls(*METALS[_metal("Conductor name", name)], roughness)
 
     def albedo(self, wo: Floats) -> Floats:
         """Return the reflectance along the mirrored direction, also of rough metals."""

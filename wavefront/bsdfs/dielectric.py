@@ -13,7 +13,7 @@ from ..core.errors import one_of
 from ..core.parameter import Parameter, parametrized
 from ..core.suggestions import suggests_keywords
 from ..textures.base import BaseTexture
-from ..textures.parameter import Color, Scalar, refractive_index, refractive_indices
+from ..textures.parameter import INDICES, Color, Scalar, refractive_index, refractive_indices
 from .base import BsdfSample, weigh
 from .channels import evaluate_channels, fresnel_channels, mean_of_channels, sample_channels
 from .energy import Loss, gain, loss
@@ -24,31 +24,6 @@ from .thin_film import has_film, thickness
 
 # Closer to 1 than this, refraction bends light by less than half vectors resolve: the boundary is smooth.
 LEAST_BEND = 1e-3
-
-# Refractive indices at 20 °C in the yellow light of sodium (589.3 nm) or helium (587.6 nm); they differ by
-# 0.0003 at most. BK7, F2, SF11: data sheets of Schott. Fused silica: I. Malitson 1965, J. Opt. Soc. Am. 55,
-# 1205. Others: CRC Handbook of Chemistry and Physics; the ordinary ray of birefringent crystals. Acrylic,
-# polycarbonate, oil and window glass vary by 0.01.
-INDICES = {
-    "acetone": 1.3588,
-    "acrylic": 1.4914,
-    "air": 1.00027,
-    "bk7": 1.5168,
-    "diamond": 2.4173,
-    "ethanol": 1.3611,
-    "f2": 1.62004,
-    "fused silica": 1.45846,
-    "glass": 1.52,
-    "glycerol": 1.4746,
-    "ice": 1.309,
-    "oil": 1.47,
-    "polycarbonate": 1.585,
-    "quartz": 1.5442,
-    "salt": 1.5443,
-    "sapphire": 1.7681,
-    "sf11": 1.78472,
-    "water": 1.333,
-}
 
 
 def dispersed(index: float, abbe: float) -> Doubles:
@@ -69,7 +44,8 @@ class Dielectric(RefractiveBsdf):
     ior
         Refractive index of the shape's inside relative to the outside, from 1e-6 to 1e6. Below 1 the outside
         is the denser medium (a bubble in water: 1/1.33). At 1 light passes straight through. Three numbers
-        are those of red, green and blue (dispersion): each refracted path follows one channel.
+        are those of red, green and blue (dispersion): each refracted path follows one channel. Or the name of
+        a clear material, as for `named`.
     roughness
         In [0, 1]; α = roughness². Below α = 0.001 it is perfectly smooth, and so is an index
         within 0.001 of 1.
@@ -95,7 +71,7 @@ class Dielectric(RefractiveBsdf):
     --------
     >>> glass = wf.Dielectric(1.5)
     >>> frosted = wf.Dielectric(1.5, roughness=0.3)
-    >>> lens = wf.Dielectric.named("BK7")
+    >>> lens = wf.Dielectric("BK7")
     >>> prism = wf.Dielectric((1.50, 1.51, 1.53))
     """
 
@@ -121,8 +97,7 @@ class Dielectric(RefractiveBsdf):
         SceneError
             If the name is not known, listing those that are.
         """
-        key = name.lower() if isinstance(name, str) else name
-        index = INDICES[one_of("Dielectric name", key, INDICES)]
+        index = INDICES[one_of("Dielectric name", name.lower() if isinstance(name, str) else name, INDICES)]
         return cls(index, roughness, reflectance=reflectance, transmittance=transmittance)
 
     def derive(self) -> None:

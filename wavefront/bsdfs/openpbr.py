@@ -17,7 +17,7 @@ from ..arrays.state import SurfaceInteraction
 from ..arrays.vec import INV_PI, TINY, Bools, Floats, dot, f4
 from ..core.parameter import Parameter, flag, parametrized
 from ..textures.base import BaseTexture
-from ..textures.parameter import Color, Scalar, color, refractive_index, scalar
+from ..textures.parameter import Color, Scalar, color, index_of, refractive_index, scalar
 from .albedo import dielectric_albedo, facet_cosines, gloss_tables, lookup
 from .base import BsdfSample, JointBsdf
 from .energy import Shape, mean_over_cosines
@@ -72,7 +72,9 @@ class OpenPBRBsdf(JointBsdf):
     coat_color: Parameter[Color] = Parameter(color, default=1.0, kw_only=True)
     coat_roughness: Parameter[Scalar] = Parameter(scalar, default=0.0, kw_only=True)
     coat_ior: Parameter[Scalar] = Parameter(
-        partial(scalar, holds=lambda x: 1 <= x <= 1e6, limit="from 1 to 1e+06"), default=1.6, kw_only=True
+        lambda name, value: scalar(name, index_of(name, value), lambda x: 1 <= x <= 1e6, "from 1 to 1e+06"),
+        default=1.6,
+        kw_only=True,
     )
     coat_darkening: Parameter[Scalar] = Parameter(scalar, default=1.0, kw_only=True)
     fuzz_weight: Parameter[Scalar] = Parameter(scalar, default=0.0, kw_only=True)

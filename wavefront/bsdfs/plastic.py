@@ -11,7 +11,7 @@ from ..core.errors import number
 from ..core.parameter import Parameter, flag, parametrized
 from ..sampling.warp import cosine_hemisphere, cosine_hemisphere_pdf
 from ..textures.base import BaseTexture
-from ..textures.parameter import MAX_INDEX, Color, Scalar, color, scalar
+from ..textures.parameter import MAX_INDEX, Color, Scalar, color, index_of, scalar
 from .base import BsdfSample, weigh
 from .fresnel import fresnel_dielectric
 from .microfacet import Facets, alpha_of, reflect, refract
@@ -65,10 +65,11 @@ class Plastic(Microfacets):
     reflectance: Parameter[Color] = Parameter(color, default=0.5)
     roughness: Parameter[Scalar] = Parameter(scalar, default=0.0)
     ior: Parameter[float] = Parameter(
-        partial(
-            number,
-            holds=lambda x: 1 / MAX_INDEX <= x <= MAX_INDEX,
-            limit=f"more than 0, from {1 / MAX_INDEX:g} to {MAX_INDEX:g}",
+        lambda name, value: number(
+            name,
+            index_of(name, value),
+            lambda x: 1 / MAX_INDEX <= x <= MAX_INDEX,
+            f"more than 0, from {1 / MAX_INDEX:g} to {MAX_INDEX:g}",
         ),
         default=1.5,
     )

@@ -1,12 +1,13 @@
 """Cameras: rays through points of the film and of the lens."""
 
-from .base import Camera, check_camera, field_of_view, image_size, upward
+from .base import Camera, ImageSize, check_camera, field_of_view, image_size, register_framing, upward
 from .projection import Orthographic, Panorama, Perspective, Projection
 from .sensors import Sensors
 from .surface_sensors import SurfaceSensors
 
 __all__ = [
     "Camera",
+    "ImageSize",
     "Orthographic",
     "Panorama",
     "Perspective",
@@ -16,5 +17,6 @@ __all__ = [
     "check_camera",
     "field_of_view",
     "image_size",
+    "register_framing",
     "upward",
 ]

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from copy import copy
-from typing import Any, ClassVar, Literal
+from typing import Any, Literal, TypeAlias
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -23,7 +23,7 @@ from ..core.errors import (
     warn_caller,
 )
 from ..core.parameter import brief
-from ..core.suggestions import suggests_keywords
+from ..core.suggestions import Answers, suggests_keywords
 from ..sampling.tiles import PictureTiles, Tiles
 from .distortion import Distortion
 from .projection import Orthographic, Panorama, Perspective, Projection
@@ -33,10 +33,19 @@ STEP = 1e-4  # of a point's distance: how far it is moved to find out how the fi
 RADIANS = (0.2, 3.2)  # a field of view in this range is probably in radians
 CENTERS = {"integer": 0.5, "half": 0.0}  # film position less pixel coordinate, for each way of counting
 PixelCenters = Literal["integer", "half"]
+ImageSize: TypeAlias = tuple[int, int] | int  # pixels: (width, height), or one number for a square
 Window = tuple[int, int, int, int]
 
 
-class Camera:
+_FRAMED: list[Callable[..., Any]] = []
+
+
+def register_framing(choose: Callable[..., Any]) -> None:
+    """Let `Camera.framing` call what chooses the camera of a render: (scene, view, fov, size, up)."""
+    _FRAMED[:] = [choose]
+
+
+class Camera(Answers):
     """A camera. Use `Camera.look_at` or one of the other class methods.
 
     Attributes
@@ -63,10 +72,6 @@ class Camera:
 
     sensor: str | None = None  # what is measured at each pixel; None where pixels are parts of a picture
     scatterings: int = 0  # of each path before it leaves the camera
-    given_elsewhere: ClassVar[dict[str, str]] = dict.fromkeys(
-        ("position", "location", "eye", "target", "look_at", "up", "fov"),
-        "wf.Camera.look_at(origin, target, up, fov=..., size=...)",
-    )
 
     @suggests_keywords
     def __init__(
@@ -74,7 +79,7 @@ class Camera:
         origin: ArrayLike,
         rotation: ArrayLike,
         projection: Projection,
-        size: tuple[int, int],
+        size: ImageSize,
         crop: Window | None = None,
     ) -> None:
         self.origin = finite_array("Camera origin", origin, (3,))
@@ -102,7 +107,7 @@ class Camera:
         up: ArrayLike = (0, 1, 0),
         fov: float = 40,
         *,
-        size: tuple[int, int] = (512, 512),
+        size: ImageSize = (512, 512),
         aperture: float = 0,
         focus: float | None = None,
         shift: tuple[float, float] = (0, 0),
@@ -153,7 +158,7 @@ class Camera:
         cam_to_world: ArrayLike,
         fov: float = 40,
         *,
-        size: tuple[int, int] = (512, 512),
+        size: ImageSize = (512, 512),
         convention: Literal["opengl", "opencv"] = "opengl",
         aperture: float = 0,
         focus: float | None = None,
@@ -194,7 +199,7 @@ class Camera:
         K: ArrayLike,
         R: ArrayLike,
         t: ArrayLike | None = None,
-        size: tuple[int, int] | None = None,
+        size: ImageSize | None = None,
         *,
         distortion: ArrayLike | None = None,
         pixel_centers: PixelCenters = "integer",
@@ -260,7 +265,7 @@ class Camera:
         up: ArrayLike = (0, 1, 0),
         *,
         height: float,
-        size: tuple[int, int] = (512, 512),
+        size: ImageSize = (512, 512),
         crop: Window | None = None,
     ) -> Camera:
         """Place a camera with parallel rays, which start on the film at `origin`.
@@ -288,7 +293,7 @@ class Camera:
         target: ArrayLike | None = None,
         up: ArrayLike = (0, 1, 0),
         *,
-        size: tuple[int, int] = (1024, 512),
+        size: ImageSize = (1024, 512),
         crop: Window | None = None,
     ) -> Camera:
         """Place a camera that sees all directions: 360° of longitude by 180° of latitude.
@@ -311,7 +316,98 @@ class Camera:
         eye, axes, _ = _look(origin, target, up)
         return cls(eye, axes, Panorama(), size, crop)
 
-    def resized(self, size: tuple[int, int]) -> Camera:
+    @classmethod
+    @suggests_keywords
+    def framing(
+        cls,
+        scene: Any,
+        view: str | ArrayLike | None = None,
+        fov: float | None = None,
+        *,
+        size: ImageSize | None = None,
+        up: ArrayLike = "auto",
+        aperture: float = 0,
+        focus: float | None = None,
+    ) -> Camera:
+        """Return the camera that `render` would choose for a scene, to be changed and given to it.
+
+        Parameters
+        ----------
+        scene, view, fov, size, up
+            As for `render`.
+        aperture, focus
+            As for `look_at`; by default the middle of what is framed is in focus.
+
+        Raises
+        ------
+        SceneError
+            As `render` does.
+
+        Examples
+        --------
+        >>> ball = wf.Sphere((0, 0, 0), 1)
+        >>> camera = wf.Camera.framing(ball, view="front", aperture=0.2, size=64)
+        >>> image = wf.render(ball, 1, camera=camera)
+        """
+        camera: Camera = _FRAMED[0](scene, view, fov, size, up)
+        return camera.replace(aperture=aperture or None, focus=focus)
+
+    @suggests_keywords
+    def replace(
+        self,
+        *,
+        origin: ArrayLike | None = None,
+        target: ArrayLike | None = None,
+        up: ArrayLike | None = None,
+        fov: float | None = None,
+        size: ImageSize | None = None,
+        aperture: float | None = None,
+        focus: float | None = None,
+        shift: tuple[float, float] | None = None,
+        height: float | None = None,
+        crop: Window | None = None,
+    ) -> Camera:
+        """Return a camera of which some things differ; what is not given stays.
+
+        Parameters
+        ----------
+        origin
+            The camera is moved there. It is not turned, unless there is a target.
+        target
+            It is turned to this point, which is in focus unless `focus` says otherwise.
+        up
+            Up direction of the picture.
+        fov, aperture, focus, shift, size, crop
+            As of `look_at`. Another size has no crop, unless one is given.
+        height
+            As of `orthographic`.
+
+        Raises
+        ------
+        SceneError
+            If the camera has no such parameter, or a value is out of range.
+
+        Examples
+        --------
+        >>> camera = wf.Camera.look_at((0, 0, 5), (0, 0, 0))
+        >>> camera.replace(fov=20, size=(64, 48))
+        <Camera: Perspective(fov=20, focus=5) at (0, 0, 5) towards (0, 0, -1), 64 × 48>
+        """
+        eye = self.origin if origin is None else finite_array("Camera origin", origin, (3,))
+        axes, lens = self.rotation, dict[str, Any]()
+        if target is not None:
+            eye, axes, distance = _look(eye, target, axes[:, 1] if up is None else up)
+            lens = {"focus": distance} if isinstance(self.projection, Perspective) else {}
+        elif up is not None:
+            axes = _axes(axes[:, 2], up)
+        given: dict[str, Any] = {"fov": fov, "aperture": aperture, "focus": focus, "shift": shift}
+        given["height"] = height
+        lens |= {name: value for name, value in given.items() if value is not None}
+        projection = self.projection.replaced(**lens) if lens else self.projection
+        window = self.window if size is None and crop is None else crop
+        return Camera(eye, axes, projection, self.resolution if size is None else size, window)
+
+    def resized(self, size: ImageSize) -> Camera:
         """Return the same camera for another (width, height), without a crop."""
         return Camera(self.origin, self.rotation, self.projection, size)
 
@@ -329,6 +425,7 @@ class Camera:
 
     # --- Matrices -------------------------------------------------------------------------------
 
+    @suggests_keywords
     def intrinsics(self, pixel_centers: PixelCenters = "integer") -> Doubles:
         """Return the matrix K (3, 3) of `from_intrinsics`, for the whole picture and without distortion.
 
@@ -353,6 +450,7 @@ class Camera:
         matrix[:3, 3] = -matrix[:3, :3] @ self.origin
         return matrix
 
+    @suggests_keywords
     def to_matrix(self, convention: Literal["opengl", "opencv"] = "opengl") -> Doubles:
         """Return the matrix (4, 4) from camera space to the world, as `from_matrix` takes it.
 
@@ -371,6 +469,7 @@ class Camera:
         matrix[:3, 3] = self.origin
         return matrix
 
+    @suggests_keywords
     def projection_matrix(self, near: float = 0.01, far: float = 1000) -> Doubles:
         """Return OpenGL's projection matrix (4, 4), from camera space ("opengl") to clip coordinates.
 
@@ -448,6 +547,7 @@ class Camera:
         row = pixel // width
         return ((row + np.uint32(y0)) * whole + (pixel - row * width + np.uint32(x0))).astype(np.uint32)
 
+    @suggests_keywords
     def pixel_rays(
         self, pixel: Words, at: Floats, center: Doubles, lens: Floats | None = None
     ) -> tuple[Floats, Floats]:
@@ -467,6 +567,7 @@ class Camera:
         x, y = (pixel - row * width).astype(f4) + at[0], row.astype(f4) + at[1]
         return self.rays(x, y, center, lens)
 
+    @suggests_keywords
     def rays(
         self, x: Floats, y: Floats, center: Doubles, lens: Floats | None = None
     ) -> tuple[Floats, Floats]:
@@ -487,6 +588,7 @@ class Camera:
         origin = np.repeat(eye, len(x), 1) if offset is None else eye + self._turned(offset)
         return origin, towards if towards.shape[1] == len(x) else np.repeat(towards, len(x), 1)
 
+    @suggests_keywords
     def connections(
         self, points: Floats, center: Doubles, lens: Floats | None = None
     ) -> tuple[Floats, Doubles, Doubles]:
@@ -529,6 +631,7 @@ class Camera:
         eye = column(self.origin - center) + self._turned(start.astype(f4))
         return eye, pixels, importance
 
+    @suggests_keywords
     def project(self, points: ArrayLike, pixel_centers: PixelCenters = "half") -> tuple[Doubles, Doubles]:
         """Return the pixel coordinates and depths of points of the world.
 
@@ -682,8 +785,8 @@ def check_camera(name: str, value: Any) -> Camera | None:
     return value
 
 
-def image_size(size: tuple[int, int]) -> tuple[int, int]:
-    """Return (width, height) as ints.
+def image_size(size: ImageSize) -> tuple[int, int]:
+    """Return (width, height) as ints; one number means a square.
 
     Raises
     ------
@@ -691,11 +794,11 @@ def image_size(size: tuple[int, int]) -> tuple[int, int]:
         If they are not two whole numbers from 1 to 65536.
     """
     try:
-        width, height = size
+        width, height = (size, size) if isinstance(size, int | np.integer) else size
         whole = int(width) == width and int(height) == height
         whole &= not isinstance(width, bool | np.bool_) and not isinstance(height, bool | np.bool_)
     except (TypeError, ValueError, OverflowError) as error:
-        raise SceneError(f"size must be (width, height), got {size!r}") from error
+        raise SceneError(f"size must be (width, height) or one number for both, got {size!r}") from error
     if not whole or not (1 <= width <= MAX_SIDE and 1 <= height <= MAX_SIDE):
         raise SceneError(f"size is {size!r}; both must be whole numbers from 1 to {MAX_SIDE}")
     return int(width), int(height)

@@ -12,9 +12,11 @@ from ..arrays.elementary import arctan2, sin_cos
 from ..arrays.vec import Doubles
 from ..core.errors import SceneError, finite_array, number
 from ..core.plural import plural
+from ..core.suggestions import suggests_keywords
 from .base import Camera, upward
 
 
+@suggests_keywords
 def orbit(camera: Camera, center: ArrayLike, degrees: float, up: ArrayLike = "y") -> Camera:
     """Return the camera turned around a vertical line.
 
@@ -45,6 +47,7 @@ def orbit(camera: Camera, center: ArrayLike, degrees: float, up: ArrayLike = "y"
     return _placed(camera, middle + turn @ (camera.origin - middle), turn @ camera.rotation)
 
 
+@suggests_keywords
 def interpolate_cameras(cameras: Sequence[Camera], n: int) -> list[Camera]:
     """Return n cameras along a smooth path through some cameras.
 

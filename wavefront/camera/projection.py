@@ -7,9 +7,11 @@ in pixels of the whole picture, x from the left and y from the top; pixel (colum
 
 from __future__ import annotations
 
+import inspect
 from abc import ABC, abstractmethod
 from collections.abc import Sequence
 from copy import copy
+from typing import Any
 
 import numpy as np
 
@@ -31,6 +33,22 @@ class Projection(Parametrized, ABC):
     def scaled(self, factor: float) -> Projection:
         """Return the projection for a scene scaled by `factor`: itself, unless it has lengths."""
         return self
+
+    def replaced(self, **changes: Any) -> Projection:
+        """Return the projection with other values of some parameters.
+
+        Raises
+        ------
+        SceneError
+            If it has no such parameter, or a value is out of range.
+        """
+        for name in changes:
+            if name not in vars(self):
+                raise SceneError(
+                    f"Camera {name} is {changes[name]!r}; a {type(self).__name__} camera has none"
+                )
+        values = {name: vars(self)[name] for name in inspect.signature(type(self)).parameters}
+        return type(self)(**{**values, **changes})
 
     @abstractmethod
     def rays(self, x: Floats, y: Floats, size: Size, lens: Floats | None) -> tuple[Floats | None, Floats]:

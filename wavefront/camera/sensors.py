@@ -13,7 +13,7 @@ from ..arrays.state import Words
 from ..arrays.vec import Doubles, Floats, f4
 from ..core.errors import SceneError, as_array, finite_array, one_of
 from ..sampling.tiles import PointTiles, nearby_ranks
-from .base import MAX_SIDE, Camera
+from .base import MAX_SIDE, Camera, ImageSize
 from .projection import Orthographic
 
 KINDS = ("irradiance", "fluence", "radiance")
@@ -117,7 +117,7 @@ class Sensors(Camera):
         sensors.lift = self.lift * factor
         return sensors
 
-    def resized(self, size: tuple[int, int]) -> NoReturn:
+    def resized(self, size: ImageSize) -> NoReturn:
         """Refuse another size: there is a pixel for each point."""
         raise SceneError(f"size is {size!r}; sensors have a pixel for each point")
 

@@ -3,10 +3,12 @@
 from .color import is_color_name, named_rows, rgb, srgb
 from .colormaps import warn_of_colormap
 from .photometry import EFFICACY, exposure, from_photometric, to_photometric
+from .temperature import blackbody
 from .transfer import linear_to_srgb, srgb_to_linear
 
 __all__ = [
     "EFFICACY",
+    "blackbody",
     "exposure",
     "from_photometric",
     "is_color_name",

@@ -16,6 +16,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from ..arrays.vec import Doubles
 from ..core.errors import SceneError, as_array, number
+from ..core.suggestions import suggests_keywords
 from .color import rgb
 
 EFFICACY = 683.0  # lm/W
@@ -23,13 +24,15 @@ WEIGHTS = (0.2126, 0.7152, 0.0722)  # of linear RGB in luminance, ITU-R BT.709
 WHITE = 1.2  # cd/m² that are white in a picture at EV100 = 0: 78 / (100 · 0.65)
 
 
+@suggests_keywords
 def to_photometric(radiometric: ArrayLike, *, efficacy: float = EFFICACY) -> NDArray[np.floating]:
     """Return the luminance of radiance, the illuminance of irradiance, or the lumens of watts.
 
     Parameters
     ----------
     radiometric
-        (..., 3) linear RGB: radiance gives cd/m², irradiance lux, intensity candela, power lumen.
+        (..., 3) linear RGB, or one number for gray: radiance gives cd/m², irradiance lux, intensity
+        candela, power lumen.
     efficacy
         lm/W of white: 683, or 179 as in Radiance.
 
@@ -49,6 +52,7 @@ def to_photometric(radiometric: ArrayLike, *, efficacy: float = EFFICACY) -> NDA
     683.0
     """
     values = as_array("radiometric", radiometric)
+    values = np.broadcast_to(values, 3) if values.ndim == 0 else values
     if values.ndim < 1 or values.shape[-1] != 3:
         raise SceneError(f"radiometric must have shape (..., 3), got {values.shape}")
     values = values if values.dtype.kind == "f" else values.astype(np.float64)
@@ -56,6 +60,7 @@ def to_photometric(radiometric: ArrayLike, *, efficacy: float = EFFICACY) -> NDA
     return np.asarray(values[..., 0] * weights[0] + values[..., 1] * weights[1] + values[..., 2] * weights[2])
 
 
+@suggests_keywords
 def from_photometric(value: float, color: ArrayLike = 1.0, *, efficacy: float = EFFICACY) -> Doubles:
     """Return linear RGB (3,) of a color whose photometric quantity is `value`.
 
@@ -87,6 +92,7 @@ def from_photometric(value: float, color: ArrayLike = 1.0, *, efficacy: float = 
     return channels * (value / seen)
 
 
+@suggests_keywords
 def exposure(
     ev100: float | None = None,
     *,

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, ClassVar, Generic, TypeVar, dataclass_tra
 import numpy as np
 
 from .errors import SceneError
-from .suggestions import suggests_keywords
+from .suggestions import Answers, suggests_keywords
 
 T = TypeVar("T")
 C = TypeVar("C", bound=type)
@@ -114,7 +114,7 @@ def instance_of(kind: type, wanted: str) -> Callable[[str, Any], Any]:
     return check
 
 
-class Parametrized:
+class Parametrized(Answers):
     """Base of classes with parameters; `repr` shows them."""
 
     defaults: ClassVar[dict[str, Any]]  # of the constructor's arguments, where `parametrized` makes it

@@ -2,116 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Iterable, Sequence
+from abc import ABCMeta
+from collections.abc import Callable, Collection, Iterable, Iterator, Sequence
 from difflib import get_close_matches
 from functools import wraps
-from typing import ParamSpec, TypeVar
+from typing import TYPE_CHECKING, Any, ParamSpec, TypeVar
+
+from .synonyms import SYNONYMS
 
 P = ParamSpec("P")
 R = TypeVar("R")
-
-COLORS = ("reflectance", "base_color", "intensity", "irradiance", "radiance", "colors")
-
-# Names in other programs, in lower case without underscores, and the names here. The first one that is known
-# where the name was used is suggested.
-SYNONYMS: dict[str, tuple[str, ...]] = {
-    "albedo": ("reflectance", "base_color"),
-    "at": ("target",),
-    "basecolor": ("reflectance",),
-    "bounces": ("max_bounces",),
-    "center": ("position", "origin", "target"),
-    "centre": ("center", "position", "origin"),
-    "color": (*COLORS, "material", "emission"),
-    "colour": (*COLORS, "material", "emission"),
-    "depth": ("max_bounces",),
-    "diffuse": ("reflectance", "base_color"),
-    "emit": ("emission",),
-    "emissive": ("emission",),
-    "energy": ("intensity", "irradiance", "radiance"),
-    "environment": ("lighting",),
-    "eta": ("ior",),
-    "eye": ("origin",),
-    "fieldofview": ("fov",),
-    "fovy": ("fov",),
-    "from": ("origin",),
-    "indexofrefraction": ("ior",),
-    "indices": ("faces",),
-    "intensity": ("irradiance", "radiance"),
-    "intior": ("ior",),
-    "irradiance": ("intensity", "radiance"),
-    "kd": ("reflectance", "base_color"),
-    "location": ("position", "origin", "center"),
-    "lookat": ("target",),
-    "lookfrom": ("origin",),
-    "maxdepth": ("max_bounces",),
-    "method": ("integrator",),
-    "njobs": ("workers",),
-    "nsamples": ("spp",),
-    "numsamples": ("spp",),
-    "numthreads": ("workers",),
-    "pixels": ("rgb",),
-    "pos": ("position", "origin", "center"),
-    "position": ("origin", "center"),
-    "power": ("intensity", "irradiance", "radiance"),
-    "quality": ("spp",),
-    "r": ("radius",),
-    "radiance": ("emission", "intensity", "irradiance"),
-    "resolution": ("size",),
-    "samplecount": ("spp",),
-    "samples": ("spp",),
-    "samplesperpixel": ("spp",),
-    "strength": ("intensity", "irradiance", "radiance"),
-    "texcoords": ("uvs",),
-    "threads": ("workers",),
-    "time": ("seconds",),
-    "timelimit": ("seconds",),
-    "timeout": ("seconds",),
-    "tint": ("transmittance", "reflectance", "base_color"),
-    "triangles": ("faces",),
-    "uv": ("uvs",),
-    "vertexcolors": ("colors",),
-    "vertexnormals": ("normals",),
-    "verts": ("vertices",),
-    "vfov": ("fov",),
-    "width": ("size",),
-    "yfov": ("fov",),
-    "arealight": ("Rectangle",),
-    "box": ("Mesh",),
-    "cube": ("Mesh",),
-    "dome": ("Environment",),
-    "envmap": ("Environment",),
-    "environmentlight": ("Environment",),
-    "glass": ("Dielectric",),
-    "halton": ("sobol",),
-    "lambertian": ("Diffuse",),
-    "metal": ("Conductor",),
-    "path": ("full",),
-    "pathtracer": ("full",),
-    "pbr": ("Principled",),
-    "perspectivecamera": ("Camera",),
-    "plane": ("Rectangle",),
-    "plastic": ("Principled",),
-    "quad": ("Rectangle",),
-    "random": ("independent",),
-    "sun": ("DirectionalLight",),
-    "triangle": ("Mesh",),
-    "trianglemesh": ("Mesh",),
-}
-
-
-# What is looked for on a BSDF and belongs to a material, by keyword or attribute, and what to write.
-MATERIAL_ARGUMENTS: dict[str, str] = {
-    "absorption": "wf.Material(bsdf, interior=wf.Medium(absorption=...))",
-    "alpha": "wf.Material(bsdf, alpha=...)",
-    "alpha_cutoff": "wf.Material(bsdf, alpha=..., alpha_cutoff=...)",
-    "emission": "wf.Material(bsdf, emission=...)",
-    "interior": "wf.Material(bsdf, interior=...)",
-    "normal_map": "wf.Material(bsdf, normal_map=...)",
-    "opacity": "wf.Material(bsdf, alpha=...)",
-    "visible_to_camera": "wf.Material(bsdf, visible_to_camera=...)",
-    "with_alpha": "wf.Material(bsdf, alpha=...)",
-    "with_normal_map": "wf.Material(bsdf, normal_map=...)",
-}
 
 
 def meant(name: str, known: Iterable[str]) -> str | None:
@@ -123,21 +23,95 @@ def meant(name: str, known: Iterable[str]) -> str | None:
     for synonym in SYNONYMS.get(word, ()):
         if _plain(synonym) in plain:
             return plain[_plain(synonym)]
+    return _misspelled(word, plain)
+
+
+def did_you_mean(name: object, known: Iterable[str], places: Iterable[str] = ()) -> str:
+    """Return "; did you mean 'x'?" or "; write x" for an unknown name, or "" where nothing is similar.
+
+    Parameters
+    ----------
+    name
+        What was looked for.
+    known
+        The names that there are.
+    places
+        Where it was looked for, as in the table of synonyms, the nearest place first.
+    """
+    if not isinstance(name, str):
+        return ""
+    plain = {_plain(other): other for other in known}
+    word = _plain(name)
+    found = plain.get(word)
+    if found is None:
+        answer = synonym_of(word, plain, places)
+        if answer:
+            return answer
+        found = _misspelled(word, plain)
+    return "" if found is None else f"; did you mean {found!r}?"
+
+
+def synonym_of(word: str, plain: dict[str, str], places: Iterable[str]) -> str:
+    """Return the answer of the table to a plain word, given the known names by their plain ones, or ""."""
+    for key in (*(f"{_plain(place)}.{word}" for place in places), word):
+        for answer in SYNONYMS.get(key, ()):
+            if _plain(answer) in plain:
+                return f"; did you mean {plain[_plain(answer)]!r}?"
+            if not _is_name(answer):
+                return f"; write {answer}"
+    return ""
+
+
+def _misspelled(word: str, plain: dict[str, str]) -> str | None:
     close = get_close_matches(word, plain, 1, 0.66 if len(word) < 4 else 0.7)  # one letter of three
     return plain[close[0]] if close else None
 
 
-def did_you_mean(name: object, known: Iterable[str]) -> str:
-    """Return "; did you mean 'x'?" for an unknown name, or "" where no known name is similar."""
-    found = meant(name, known) if isinstance(name, str) else None
-    return "" if found is None else f"; did you mean {found!r}?"
+def _is_name(answer: str) -> bool:
+    """Return whether an answer is a name, also one of two words, and not what to write."""
+    return answer.replace(" ", "_").isidentifier()
+
+
+class Answering(ABCMeta):
+    """The class of classes that answer to the names of other programs."""
+
+    if not TYPE_CHECKING:
+
+        def __getattr__(cls, name: str) -> Any:
+            """Raise an AttributeError that says what there is in place of a known name."""
+            text = f"type object {cls.__name__!r} has no attribute {name!r}{_instead(cls, name)}"
+            raise AttributeError(text, name=name, obj=cls)
+
+
+class Answers(metaclass=Answering):
+    """Base of classes that answer to the names of other programs, of the class and of its objects."""
+
+    __slots__ = ()
+
+    if not TYPE_CHECKING:  # a type checker would take every name for an attribute
+
+        def __getattr__(self, name: str) -> Any:
+            """Raise an AttributeError that says what there is in place of a known name."""
+            cls = type(self)
+            text = f"{cls.__name__!r} object has no attribute {name!r}{_instead(cls, name)}"
+            raise AttributeError(text, name=name, obj=self)
+
+
+def _instead(cls: type, name: str) -> str:
+    """Return what there is in place of an attribute: only by the table, as programs ask often."""
+    if name.startswith("_"):
+        return ""
+    word = _plain(name)
+    for each in cls.__mro__:
+        for answer in SYNONYMS.get(f"{each.__name__.lower()}.{word}", ()):
+            return f"; did you mean {answer!r}?" if _is_name(answer) else f"; write {answer}"
+    return ""
 
 
 def suggests_keywords(function: Callable[P, R]) -> Callable[P, R]:
     """Let a function suggest a known keyword argument for an unknown one.
 
-    The error is a TypeError, as in Python, and the signature is that of the function. A class may have
-    `given_elsewhere`: for keywords that belong to another class, what to write.
+    The error is a TypeError, as in Python, and the signature is that of the function.
     """
     code = function.__code__
     known = code.co_varnames[: code.co_argcount + code.co_kwonlyargcount]
@@ -162,13 +136,21 @@ def check_keywords(
     """
     for name in names:
         if name not in known:
-            makes = function.__name__ == "__init__"
-            elsewhere = getattr(args[0], "given_elsewhere", {}) if args else {}
-            hint = did_you_mean(name, known)
-            if name in elsewhere and (makes or not hint):
-                hint = f"; write {elsewhere[name]}"
-            title = type(args[0]).__name__ if makes else function.__qualname__
+            title = type(args[0]).__name__ if function.__name__ == "__init__" else function.__qualname__
+            hint = did_you_mean(name, known, _places(function, args))
             raise TypeError(f"{title}() got an unexpected keyword argument {name!r}{hint}")
+
+
+def _places(function: Callable[..., object], args: Sequence[object]) -> Iterator[str]:
+    """Yield where an argument is looked for: the function, and the classes that it is of."""
+    name = function.__qualname__
+    if "." not in name:
+        yield name
+        return
+    owner = args[0] if isinstance(args[0], type) else type(args[0])
+    for each in owner.__mro__:
+        yield f"{each.__name__}()" if name.endswith("__init__") else f"{each.__name__}.{function.__name__}"
+        yield each.__name__
 
 
 def _plain(name: str) -> str:

@@ -9,7 +9,7 @@ from typing import Any, Protocol, Unpack
 
 import numpy as np
 
-from ..camera import Camera, check_camera
+from ..camera import Camera, ImageSize, check_camera
 from ..codecs.display import Display
 from ..codecs.png_jpeg import Gamma
 from ..codecs.white_balance import WhiteBalance
@@ -231,7 +231,7 @@ def _chosen_formats(value: str | Sequence[str]) -> list[str]:
 
 
 def _checked_cameras(
-    cameras: Iterable[Camera], size: tuple[int, int] | None, layouts: dict[str, Layout]
+    cameras: Iterable[Camera], size: ImageSize | None, layouts: dict[str, Layout]
 ) -> list[Camera]:
     """Return the cameras in the size that is asked for."""
     found = []

@@ -16,10 +16,11 @@ from ..codecs.images import three_channels
 from ..codecs.png_jpeg import EXTENSIONS
 from ..core.errors import SceneError, as_array
 from ..core.plural import plural
+from ..core.suggestions import Answers, suggests_keywords
 from ..film.film import EPSILON, batch_size
 from ..film.samples import shared_samples
 from ..sampling.tiles import MEMBERS
-from ..statistics.significance import Estimate, estimate, significance
+from ..statistics.significance import Estimate, Significance, estimate, significance
 from .image import Image
 
 UNLIKELY = 0.01  # p-value below which noise hardly explains a difference
@@ -28,7 +29,7 @@ Picture: TypeAlias = Image | ArrayLike | str | os.PathLike[str]
 
 
 @dataclass(frozen=True, slots=True)
-class Comparison:
+class Comparison(Answers):
     """The difference of picture a from the reference b, over the linear values of all pixels and channels.
 
     `print` shows it as a table.
@@ -55,6 +56,7 @@ class Comparison:
     p_mean: float | None  # p-value of the mean of the picture
     p_value: float | None  # p-value of all three
     p_absent: str  # the reason why they are None
+    shared: str  # which samples the pictures share, and what that means for the p-values; "" for none
     difference: Image = field(repr=False)  # |a − b|
 
     def __repr__(self) -> str:
@@ -84,10 +86,12 @@ class Comparison:
         may = "may well explain" if self.p_value >= UNLIKELY else "hardly explains"
         return [
             *rows,
+            *([("samples", self.shared)] if self.shared else []),
             ("noise alone", f"{may} the difference (p_value {self.p_value:.3g}, limit {UNLIKELY})"),
         ]
 
 
+@suggests_keywords
 def compare(a: Picture, b: Picture) -> Comparison:
     """Measure the difference of picture `a` from the reference `b`.
 
@@ -99,12 +103,13 @@ def compare(a: Picture, b: Picture) -> Comparison:
     The p-values say whether two noisy pictures are the same up to noise. Each is the probability that two
     pictures that differ by noise alone differ as much as these two do, in the least likely pixel, block or
     channel of the mean. It is corrected for their number: for any size of picture, one in a hundred is below
-    0.01. They need two rendered pictures with standard errors and at least two samples per pixel, which share
-    no samples: with the same seed and sampler the samples must not overlap. Otherwise they are None, and
-    `p_absent` says why. Of pictures with `reuse=True`, whose pixels share noise, those of blocks take the
-    errors of their tiles from batches of samples, and that of the mean takes tiles as samples; where a file
-    does not keep them (exr), they take the worst case, and find less. Sources are in
-    `wavefront/statistics/significance.py`.
+    0.01. They need two rendered pictures with standard errors and at least two samples per pixel. Otherwise
+    they are None, and `p_absent` says why. Those of equal pictures are 1. Pictures of the same seed and
+    sampler may share samples: `shared` says which. Their errors depend on each other, and are taken to add up
+    at worst, so that such a test finds less than one of pictures with different seeds. Of pictures with
+    `reuse=True`, whose pixels share noise, those of blocks take the errors of their tiles from batches of
+    samples, and that of the mean takes tiles as samples; where a file does not keep them (exr), they take the
+    worst case, and find less. Sources are in `wavefront/statistics/significance.py`.
 
     FLIP needs `pip install flip-evaluator`. For two pictures of 8 bits it is LDR-FLIP, else
     HDR-FLIP (P. Andersson et al., FLIP, 2020, and Visualizing Errors in Rendered High Dynamic Range
@@ -137,8 +142,7 @@ def compare(a: Picture, b: Picture) -> Comparison:
     squared = np.square(left - right)
     rmse = float(np.sqrt(squared.mean()))
     flip, flip_absent = _flip(left, right, coded)
-    p_absent = _untestable("a", a) or _untestable("b", b) or _dependent(a, b)
-    p = None if p_absent else significance(_estimate(a, left), _estimate(b, right))
+    p, p_absent, shared = _tested(a, b, left, right)
     return Comparison(
         relative_mse=float((squared / (np.square(right) + (EPSILON * right.mean() ** 2 or 1.0))).mean()),
         rmse=rmse,
@@ -152,6 +156,7 @@ def compare(a: Picture, b: Picture) -> Comparison:
         p_mean=None if p is None else p.mean,
         p_value=None if p is None else p.all_levels,
         p_absent=p_absent,
+        shared=shared,
         difference=Image(np.abs(left - right).astype(np.float32)),
     )
 
@@ -209,26 +214,46 @@ def _untestable(name: str, picture: Image | ArrayLike) -> str:
     return ""
 
 
-def _dependent(a: Image | ArrayLike, b: Image | ArrayLike) -> str:
-    """Return the reason why the errors of two pictures depend on each other, or nothing."""
-    assert isinstance(a, Image)
-    assert isinstance(b, Image)
+def _tested(
+    a: Image | ArrayLike, b: Image | ArrayLike, left: Doubles, right: Doubles
+) -> tuple[Significance | None, str, str]:
+    """Return the p-values of pictures, of linear values (H, W, 3), why there are none, and `shared`."""
+    if np.array_equal(left, right):
+        return Significance(1.0, 1.0, 1.0), "", _shared(a, b)[0]
+    absent = _untestable("a", a) or _untestable("b", b)
+    if absent:
+        return None, absent, ""
+    shared, factor = _shared(a, b)
+    return significance(_estimate(a, left, factor), _estimate(b, right, factor)), "", shared
+
+
+def _shared(a: Image | ArrayLike, b: Image | ArrayLike) -> tuple[str, float]:
+    """Return which samples two pictures share, and by what variances are multiplied for that.
+
+    The variance of a difference is at most (σa + σb)² ≤ 2·(σa² + σb²), whatever the errors have in common.
+    """
+    if not (isinstance(a, Image) and isinstance(b, Image)):
+        return "", 1.0
     shared = shared_samples(a.metadata, b.metadata)
     if shared is None:
-        return ""
+        return "", 1.0
     return (
-        f"not computed: the pictures share samples {shared[0]} to {shared[1] - 1} of seed "
-        f"{a.metadata['seed']}; render one with another seed"
+        f"the pictures share samples {shared[0]} to {shared[1] - 1} of seed {a.metadata['seed']}: p-values "
+        "are cautious, and find less than those of another seed",
+        2.0,
     )
 
 
-def _estimate(picture: Image | ArrayLike, mean: Doubles) -> Estimate:
-    """Return what a testable picture, of linear values (H, W, 3), says of its mean and its error."""
+def _estimate(picture: Image | ArrayLike, mean: Doubles, factor: float) -> Estimate:
+    """Return what a testable picture, of linear values (H, W, 3), says of its mean and its error.
+
+    Variances are multiplied by `factor`.
+    """
     assert isinstance(picture, Image)
     assert picture.counts is not None
     assert picture.standard_error is not None
-    squared_error = np.square(picture.standard_error, dtype=np.float64)
-    variance = None if picture.variance is None else picture.variance.astype(np.float64)
+    squared_error = factor * np.square(picture.standard_error, dtype=np.float64)
+    variance = None if picture.variance is None else factor * picture.variance.astype(np.float64)
     sharing = MEMBERS if picture.metadata.get("reuse") else 1
     batches = _batches(picture.counts)
     return estimate(mean, squared_error, variance, batches, picture.counts, picture.scatter, sharing)

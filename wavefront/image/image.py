@@ -22,7 +22,7 @@ from ..codecs.white_balance import WhiteBalance
 from ..colors import EFFICACY, rgb, to_photometric
 from ..core.errors import SceneError, as_array, number, one_of
 from ..core.html import picture_html
-from ..core.suggestions import did_you_mean
+from ..core.suggestions import Answers, did_you_mean, suggests_keywords
 from ..film.aov_names import AOVS, BOXES, CLAMPED, GIVEN_AOVS, NOISY, is_radiance
 from ..film.checkpoint import contents_of, is_checkpoint, read_checkpoint
 from ..film.film import Film, batch_size, chunks
@@ -45,7 +45,7 @@ FIELDS = ("counts", "variance", "standard_error")  # arrays (H, W, ...) besides 
 PARTS = ("rgb", "spp", "metadata", *FIELDS, "layers", "errors", "names", "sums", "scatter")
 
 
-class Image:
+class Image(Answers):
     """A rendered picture.
 
     Attributes
@@ -164,7 +164,7 @@ class Image:
             setting = "clamp=" if name == CLAMPED else f"aovs=({name!r},)"
             raise AttributeError(f"the image has no layer {name!r}; render it with {setting}")
         known = () if name.startswith("_") else (*AOVS, *GIVEN_AOVS, *vars(self), *dir(type(self)))
-        hint = did_you_mean(name, [other for other in known if not other.startswith("_")])
+        hint = did_you_mean(name, [other for other in known if not other.startswith("_")], ("image",))
         raise AttributeError(f"{type(self).__name__!r} object has no attribute {name!r}{hint}")
 
     @property
@@ -175,6 +175,7 @@ class Image:
         found: list[dict[str, Any]] = self.metadata[BOXES]
         return found
 
+    @suggests_keywords
     def mask(self, which: int | str, kind: str = "shape") -> Bools:
         """Return a mask (H, W): the pixels whose center ray meets an object, by its id or name.
 
@@ -201,6 +202,7 @@ class Image:
             )
         return np.isin(ids, chosen)
 
+    @suggests_keywords
     def mean(self, region: Any = None, kind: str = "shape") -> RegionMean:
         """Return the mean of a region and its standard error, also where pixels share paths.
 
@@ -334,7 +336,10 @@ class Image:
         return function(*_as_arrays(args), **{name: _as_arrays(value) for name, value in kwargs.items()})
 
     def __getitem__(self, key: Any) -> NDArray[np.float32]:
-        """Return `rgb[key]`: image[y, x] is one pixel, (3,)."""
+        """Return `rgb[key]`: image[y, x] is one pixel, (3,); for a text the layer of this name."""
+        if isinstance(key, str):
+            layer: NDArray[np.float32] = self.layers[key] if key in self.layers else getattr(self, key)
+            return layer
         return self.rgb[key]
 
     def __sub__(self, other: Image) -> Image:
@@ -401,6 +406,7 @@ class Image:
 
     __rmul__ = __mul__
 
+    @suggests_keywords
     def denoise(self, denoiser: str = "auto") -> Image:
         """Return the picture without most of its noise.
 
@@ -532,6 +538,7 @@ class Image:
             scatter=restored_scatter(os.fspath(path), found.rgb.shape, scatter),
         )
 
+    @suggests_keywords
     def outlined(
         self, color: ArrayLike = 0.0, width: float = 2.0, *, crease: float = 40.0, jump: float = 0.01
     ) -> Image:
@@ -581,6 +588,7 @@ class Image:
             sums=None,
         )
 
+    @suggests_keywords
     def to_uint8(
         self,
         gamma: Gamma = 2.2,
@@ -615,6 +623,7 @@ class Image:
         """
         return self._codes(Display(gamma, exposure, tone, white_balance), bits=8)
 
+    @suggests_keywords
     def to_uint16(
         self,
         gamma: Gamma = 2.2,
@@ -625,6 +634,7 @@ class Image:
         """Return the picture as codes of 16 bits; parameters and shape are those of `to_uint8`."""
         return self._codes(Display(gamma, exposure, tone, white_balance), bits=16)
 
+    @suggests_keywords
     def to_pil(
         self,
         gamma: Gamma = 2.2,
@@ -637,6 +647,7 @@ class Image:
 
         return fromarray(self.to_uint8(gamma, exposure, tone, white_balance))
 
+    @suggests_keywords
     def show(
         self,
         gamma: Gamma = 2.2,
@@ -656,6 +667,7 @@ class Image:
         else:
             picture.show()
 
+    @suggests_keywords
     def save(
         self,
         path: str | os.PathLike[str],
@@ -702,6 +714,7 @@ class Image:
         """
         write_image(path, self._data(), Display(gamma, exposure, tone, white_balance), bits)
 
+    @suggests_keywords
     def plot(self, name: str = "rgb", axes: Any = None) -> Any:
         """Plot the picture or an AOV with matplotlib.
 
@@ -736,6 +749,7 @@ class Image:
         table = self.names.get(name.removesuffix("_id"), {}) if name.endswith("_id") else None
         return plot.draw(name, self.to_uint8()[..., :3] if name == "rgb" else values, table, axes)
 
+    @suggests_keywords
     def false_color(
         self,
         limits: tuple[float, float] | None = None,

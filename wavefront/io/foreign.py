@@ -9,6 +9,7 @@ import numpy as np
 from ..colors import srgb
 from ..core.errors import SceneError, warn_caller
 from ..core.plural import plural
+from ..core.suggestions import suggests_keywords
 from ..scene import Scene
 from ..shapes import Capsules, Shape
 from ..shapes.points import point_colors
@@ -22,6 +23,7 @@ from .repair import RawMesh, Table, build, with_face_colors
 LINE = 0.0025  # radius of lines, in parts of the diagonal of all
 
 
+@suggests_keywords
 def from_pyvista(data: Any, *, smooth: bool | float | str = AUTO) -> Scene:
     """Convert an object of PyVista to a scene: `PolyData`, or a grid, whose surface is taken.
 
@@ -84,6 +86,7 @@ def from_pyvista(data: Any, *, smooth: bool | float | str = AUTO) -> Scene:
     return Scene(_spheres(name, points, point_colors(values)))
 
 
+@suggests_keywords
 def from_open3d(data: Any, *, smooth: bool | float | str = AUTO) -> Scene:
     """Convert an object of Open3D to a scene: `TriangleMesh`, `PointCloud` or `LineSet`, also of tensors.
 

@@ -14,6 +14,7 @@ from ..codecs.budget import in_memory
 from ..core.errors import SceneError, number
 from ..core.files import path_name
 from ..core.progress import Progress, phase
+from ..core.suggestions import suggests_keywords
 from ..materials import MaterialLike
 from ..scene import Scene
 from ..shapes import Instance, Mesh, Shape
@@ -28,6 +29,7 @@ from .sources import LoadLimits, PathLike, SceneFiles, checked_limits, folders
 T = TypeVar("T")
 
 
+@suggests_keywords
 def load(
     path: PathLike,
     *,
@@ -103,6 +105,7 @@ def load(
         return scene
 
 
+@suggests_keywords
 def load_mesh(
     path: PathLike,
     material: MaterialLike | None = None,
@@ -191,6 +194,7 @@ def _reading(path: PathLike, progress: Progress) -> Iterator[None]:
         yield
 
 
+@suggests_keywords
 def from_trimesh(geometry: Any, *, smooth: bool | float | str = AUTO) -> Scene:
     """Convert a `trimesh.Trimesh` or `trimesh.Scene` to a scene, as if it had been read from a file.
 
@@ -237,6 +241,7 @@ def from_trimesh(geometry: Any, *, smooth: bool | float | str = AUTO) -> Scene:
         return scene
 
 
+@suggests_keywords
 def from_mitsuba(
     scene: Mapping[str, Any], *, strict: bool = False, limits: LoadLimits | None = None
 ) -> Scene:

@@ -15,6 +15,7 @@ import numpy as np
 from ..arrays.vec import f4
 from ..core.errors import SceneError, hear_warnings
 from ..core.files import path_name
+from ..core.suggestions import suggests_keywords
 from ..materials import Material, OpenPBR
 from ..textures.base import BaseTexture
 from ..textures.image import Texture
@@ -106,6 +107,7 @@ class Lost(Exception):
     """A node that is not supported."""
 
 
+@suggests_keywords
 def load_materialx(
     path: PathLike,
     *,

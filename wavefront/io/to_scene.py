@@ -5,11 +5,12 @@ from __future__ import annotations
 import os
 from collections.abc import Mapping, Sequence
 from copy import copy
+from numbers import Real
 from typing import Any
 
 import numpy as np
 
-from ..camera import Camera
+from ..camera import Camera, ImageSize, field_of_view, image_size, register_framing
 from ..core.errors import SceneError
 from ..core.progress import Progress
 from ..lights import Light
@@ -19,7 +20,7 @@ from ..shapes import Instance, Mesh, Shape
 
 SIZE = (512, 512)  # pixels
 CAN_BE_RENDERED = (
-    "a wf.Scene, a path, a mesh of trimesh, PyVista or Open3D, (vertices, faces) as a tuple, a shape such as "
+    "a wf.Scene, a path, a mesh of trimesh, PyVista or Open3D, (vertices, faces), a shape such as "
     "wf.Mesh, wf.Rectangle, wf.Disk or wf.Sphere, or a list of these"
 )
 
@@ -73,8 +74,8 @@ def as_scene(
     convert = importer(subject)
     if convert is not None:
         return _all_made_of(convert(subject, smooth), material)
-    if _is_pair(subject):
-        return Scene([Mesh(*subject, material=material, smooth=False if smooth == AUTO else smooth)])
+    if _is_mesh(subject):
+        return Scene([_mesh_of(subject, material, smooth)])
     if isinstance(subject, list | tuple) and subject:
         if id(subject) in within:
             raise SceneError("cannot render a list that contains itself")
@@ -86,7 +87,7 @@ def as_scene(
 def choose_camera(
     scene: Scene,
     camera: Camera | None,
-    size: tuple[int, int] | None,
+    size: ImageSize | None,
     up: Any = AUTO,
     view: Any = None,
     fov: float | None = None,
@@ -126,13 +127,39 @@ def choose_camera(
     return scene.framing_camera(fov, size, up=up, direction=view, turning=turning), True
 
 
-def _is_pair(subject: Any) -> bool:
-    """Return True for (vertices, faces)."""
-    if not isinstance(subject, tuple) or len(subject) != 2:
+def framed(subject: Any, view: Any, fov: float | None, size: Any, up: Any) -> Camera:
+    """Return the camera by which `render` would see what it is given; arguments as for `render`."""
+    size = None if size is None else image_size(size)
+    fov = None if fov is None else field_of_view(fov)
+    return choose_camera(as_scene(subject), None, size, up, view, fov)[0]
+
+
+def _is_mesh(subject: Any) -> bool:
+    """Return True for (vertices, faces) or (vertices, faces, normals), as a tuple or a list."""
+    if not isinstance(subject, tuple | list) or len(subject) not in (2, 3):
         return False
-    return all(isinstance(part, np.ndarray | list | tuple) for part in subject) and not any(
-        isinstance(item, Shape) or importer(item) is not None for part in subject for item in part[:1]
-    )
+    return all(_is_table(part) for part in subject)
+
+
+def _is_table(part: Any) -> bool:
+    """Return True for an array, or a list of rows of numbers."""
+    if isinstance(part, np.ndarray):
+        return True
+    row = part[0] if isinstance(part, list | tuple) and part else None
+    if isinstance(row, np.ndarray):
+        return row.ndim == 1
+    return isinstance(row, list | tuple) and all(isinstance(each, Real) for each in row)
+
+
+def _mesh_of(parts: Sequence[Any], material: Material | None, smooth: bool | float | str) -> Mesh:
+    """Return the mesh of vertices, faces and perhaps normals, in whose place `smooth` computes some."""
+    vertices, faces = parts[:2]
+    flat = np.asarray(faces)
+    if flat.ndim == 1 and flat.size and flat.size % 4 == 0 and (flat[::4] == 3).all():
+        faces = flat.reshape(-1, 4)[:, 1:]  # a count before the corners, as PyVista has them
+    smooth = False if smooth == AUTO else smooth
+    normals = parts[2] if len(parts) == 3 and smooth is False else None
+    return Mesh(vertices, faces, normals=normals, material=material, smooth=smooth)
 
 
 def _joined(
@@ -201,6 +228,7 @@ def _from_open3d(data: Any, smooth: bool | float | str = AUTO) -> Scene:
     return from_open3d(data, smooth=smooth)
 
 
+register_framing(framed)
 register_importer("trimesh", _imported)
 register_importer("pyvista", _from_pyvista)
 register_importer("open3d", _from_open3d)

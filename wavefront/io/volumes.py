@@ -14,6 +14,7 @@ from ..codecs.budget import Budget
 from ..codecs.npz import read_array, read_arrays
 from ..core.errors import SceneError, one_of
 from ..core.files import extension_of, path_name, read_bytes
+from ..core.suggestions import suggests_keywords
 from .sources import LoadLimits, PathLike, checked_limits
 from .volume_libraries import chosen, placed, read_nrrd, read_vdb, read_vti
 
@@ -21,6 +22,7 @@ VOL_HEADER = struct.Struct("<3sBiiiii6f")
 VOL_FLOAT32 = 1
 
 
+@suggests_keywords
 def load_grid(
     path: PathLike, name: str | None = None, *, limits: LoadLimits | None = None
 ) -> tuple[Floats, Doubles]:

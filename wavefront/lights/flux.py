@@ -10,6 +10,7 @@ import numpy as np
 from ..arrays.vec import Doubles
 from ..colors import EFFICACY, to_photometric
 from ..core.errors import SceneError, number
+from ..core.suggestions import suggests_keywords
 from ..shapes import Mesh, Shape, Sphere
 from .base import Light
 from .ies import IESLight
@@ -19,6 +20,7 @@ from .spot import SpotLight
 Source = TypeVar("Source", bound=Light | Shape)
 
 
+@suggests_keywords
 def with_flux(
     source: Source, lumens: float | None = None, *, watts: float | None = None, efficacy: float = EFFICACY
 ) -> Source:

@@ -18,6 +18,7 @@ from ..camera import upward
 from ..colors import from_photometric, rgb
 from ..core.errors import SceneError, finite_array, number
 from ..core.parameter import Parameter, Parametrized, brief, instance_of, optional, parametrized
+from ..core.suggestions import suggests_keywords
 from ..film.aov_names import DEFAULT_GROUP, group_name
 from .base import FarLight, LightSample, Receiver
 from .directional import DirectionalLight, unit
@@ -138,8 +139,10 @@ class Sky(Parametrized, FarLight):
     >>> scene = wf.Scene([wf.Sphere((0, 0, 0), 1)], [sky])
     """
 
-    model: Parameter[SkyFunction] = Parameter(instance_of(SkyFunction, "a SkyFunction"), alias="function")
-    sun: Parameter[ArrayLike] = Parameter(unit)
+    model: Parameter[SkyFunction] = Parameter(
+        instance_of(SkyFunction, "a SkyFunction; wf.Sky.cie(12, sun) is a clear sky"), alias="function"
+    )
+    sun: Parameter[ArrayLike | None] = Parameter(unit, default=None)
     up: Parameter[ArrayLike] = Parameter(_zenith, default="y")
     scale: Parameter[ArrayLike | None] = Parameter(optional(rgb), default=None, kw_only=True)
     horizontal: Parameter[ArrayLike] = Parameter(rgb, default=1.0, kw_only=True)
@@ -168,6 +171,7 @@ class Sky(Parametrized, FarLight):
         self._light = SkyLight(self.model, shade, below, self.up.astype(f4), self.sun.astype(f4), table)
 
     @classmethod
+    @suggests_keywords
     def cie(
         cls,
         type: int,
@@ -219,6 +223,7 @@ class Sky(Parametrized, FarLight):
         )
 
     @classmethod
+    @suggests_keywords
     def perez(
         cls,
         direct_normal: float,
@@ -287,6 +292,7 @@ class Sky(Parametrized, FarLight):
         )
 
     @classmethod
+    @suggests_keywords
     def hosek_wilkie(
         cls,
         turbidity: float,

@@ -110,7 +110,8 @@ class Material(Parametrized):
         ----------
         name
             In upper or lower case; docs/materials.md lists all. Metals and clear materials have measured
-            constants. All others were chosen by eye.
+            constants. All others were chosen by eye. A color may stand before it, as in "red plastic"; a
+            color alone, such as "red" or "#ff8800", is matte.
         color
             The color in place of the usual one, as for `Diffuse`. Metals and mirrors have their own. For
             clear materials it is the tint of the light that passes their surface.

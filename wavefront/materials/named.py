@@ -52,8 +52,8 @@ def named_bsdf(title: str, name: str, color: Color | None) -> tuple[str, Bsdf]:
     """
     key = " ".join(name.lower().replace("_", " ").replace("-", " ").split())
     key = SPELLINGS.get(key, key)
-    if key not in NAMED_MATERIALS and is_color_name(name):
-        raise SceneError(f"{title} is {name!r}, a color and no material; wf.Diffuse({name!r}) is matte of it")
+    if key not in NAMED_MATERIALS and color is None:
+        key, color = _with_color(key)
     one_of(title, key, NAMED_MATERIALS)
     if key in _COLORED:
         make, usual = _COLORED[key]
@@ -62,3 +62,14 @@ def named_bsdf(title: str, name: str, color: Color | None) -> tuple[str, Bsdf]:
         colored = ", ".join(_COLORED)
         raise SceneError(f"{title} is {name!r}, whose color is its own; those with a color are {colored}")
     return key, _FIXED[key]()
+
+
+def _with_color(key: str) -> tuple[str, str | None]:
+    """Return the name of a material and its color, from a color, which is "matte", or "red plastic"."""
+    if is_color_name(key):
+        return "matte", key
+    for material in NAMED_MATERIALS:
+        color = key.removesuffix(f" {material}")
+        if color != key and is_color_name(color):
+            return material, color
+    return key, None

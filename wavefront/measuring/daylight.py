@@ -12,6 +12,7 @@ from numpy.typing import ArrayLike
 from ..arrays.vec import Doubles, f4, luminance
 from ..camera import Sensors
 from ..core.errors import SceneError
+from ..core.suggestions import suggests_keywords
 from ..io.to_scene import as_scene
 from ..lights import PatchedEnvironment, SkyPatches
 from ..scene import Scene
@@ -113,6 +114,7 @@ class DaylightCoefficients:
         below = luminance(sky.radiance([-self.patches.axes[:, 2]]).T)
         return np.concatenate([below, above])
 
+    @suggests_keywords
     def annual(self, weather: Weather, *, ground: float = 0.2, efficacy: float = 1.0) -> Year:
         """Return the light at the points in each hour of a weather file.
 

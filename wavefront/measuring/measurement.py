@@ -12,13 +12,14 @@ from ..arrays.vec import Doubles
 from ..core.errors import SaveError, SceneError
 from ..core.files import check_target, write_bytes
 from ..core.plural import plural
+from ..core.suggestions import Answers, suggests_keywords
 from ..image import Image
 from ..statistics import RegionMean
 
 COLORS = ("r", "g", "b")
 
 
-class Measurement:
+class Measurement(Answers):
     """Light at points, from `measure`.
 
     Parameters
@@ -89,6 +90,7 @@ class Measurement:
         scale = self.image.layers.get("scale")
         return self._rows(values if scale is None else (values * scale[..., None]).astype(np.float32))
 
+    @suggests_keywords
     def interval(self, confidence: float = 0.95) -> tuple[Doubles, Doubles]:
         """Return the confidence interval of each value: lower and upper limits, (n, 3) each.
 
@@ -209,6 +211,7 @@ class Measurement:
         except SceneError as error:
             raise SceneError(f"{os.fspath(path)}: {error}") from None
 
+    @suggests_keywords
     def plot(self, levels: int = 8, axes: Any = None, label: str | None = None) -> Any:
         """Plot the luminance of the values with matplotlib: false color and isolines over a plane of points.
 

@@ -10,13 +10,15 @@ from numpy.typing import ArrayLike
 from ..arrays.vec import Doubles
 from ..core.errors import SceneError, finite_array
 from ..core.files import decode_text, read_bytes
+from ..core.suggestions import suggests_keywords
 from ..settings import whole_number
 
 MOST = 2**24  # points along one side
 
 
+@suggests_keywords
 def grid_points(
-    corner: ArrayLike, edge_u: ArrayLike, edge_v: ArrayLike, counts: tuple[int, int]
+    corner: ArrayLike, edge_u: ArrayLike, edge_v: ArrayLike, counts: tuple[int, int] | int
 ) -> tuple[Doubles, Doubles]:
     """Return points in the middle of the cells of a parallelogram, and its normal at each, (n, 3).
 
@@ -25,7 +27,7 @@ def grid_points(
     corner, edge_u, edge_v
         (3,) as of `Rectangle`, scene units. The normal is that of edge_u × edge_v.
     counts
-        How many cells there are along edge_u and along edge_v.
+        How many cells there are along edge_u and along edge_v; one number for both.
 
     Raises
     ------
@@ -42,7 +44,10 @@ def grid_points(
         finite_array(f"grid_points: {name}", value, (3,))
         for name, value in (("corner", corner), ("edge_u", edge_u), ("edge_v", edge_v))
     )
-    many, rows = (whole_number(1, MOST)("grid_points: counts", each) for each in counts)
+    both = (counts, counts) if isinstance(counts, int | np.integer) else tuple(counts)
+    if len(both) != 2:
+        raise SceneError(f"grid_points: counts is {counts!r}; it must be two whole numbers, or one for both")
+    many, rows = (whole_number(1, MOST)("grid_points: counts", each) for each in both)
     normal = np.cross(u, v)
     length = np.linalg.norm(normal)
     if not length > 0:
@@ -55,6 +60,7 @@ def grid_points(
     return points, np.tile(normal / length, (len(points), 1))
 
 
+@suggests_keywords
 def load_points(path: str | os.PathLike[str]) -> tuple[Doubles, Doubles | None]:
     """Read points, and directions where there are any, (n, 3) each, from a table of numbers.
 

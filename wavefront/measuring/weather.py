@@ -12,6 +12,7 @@ from numpy.typing import ArrayLike
 from ..arrays.vec import Doubles, f4
 from ..core.errors import SceneError, finite_array
 from ..core.files import decode_text, read_bytes
+from ..core.suggestions import suggests_keywords
 from ..lights import SkyPatches
 from ..lights.sky import SOLAR_CONSTANT, relative_radiance
 from ..lights.sky_functions import perez_function
@@ -108,6 +109,7 @@ def product(a: Doubles, b: Doubles) -> Doubles:
     return out
 
 
+@suggests_keywords
 def load_weather(
     path: str | os.PathLike[str], *, up: ArrayLike = "y", north: ArrayLike | None = None
 ) -> Weather:

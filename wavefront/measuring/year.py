@@ -9,6 +9,7 @@ from numpy.typing import ArrayLike
 
 from ..arrays.vec import Doubles, Floats
 from ..core.errors import SceneError, number
+from ..core.suggestions import suggests_keywords
 from .weather import Weather
 
 USEFUL = 100.0, 3000.0  # lux
@@ -53,6 +54,7 @@ class Year:
         spread = self.batches.std(0, ddof=1, dtype=float)
         return np.asarray(spread / np.sqrt(len(self.batches)))
 
+    @suggests_keywords
     def total(self, hours: ArrayLike | None = None) -> tuple[Doubles, Doubles]:
         """Return the sum over the hours, such as W·h·m⁻², and its standard error, (n,) each.
 
@@ -63,6 +65,7 @@ class Year:
         """
         return self._estimate(lambda light: light.sum(1), hours)
 
+    @suggests_keywords
     def daylight_autonomy(self, least: float, hours: ArrayLike | None = None) -> tuple[Doubles, Doubles]:
         """Return the part of the hours with at least so much light, and its standard error, (n,) each.
 
@@ -76,6 +79,7 @@ class Year:
         limit = number("least", least)
         return self._estimate(lambda light: (light >= limit).mean(1), hours)
 
+    @suggests_keywords
     def useful_daylight(
         self, low: float = USEFUL[0], high: float = USEFUL[1], hours: ArrayLike | None = None
     ) -> tuple[Doubles, Doubles]:

@@ -19,6 +19,7 @@ from ..arrays.vec import Doubles
 from ..bsdfs import Diffuse
 from ..camera import Camera, upward
 from ..core.errors import SceneError
+from ..core.suggestions import suggests_keywords
 from ..lights import Environment, Light, Sky
 from ..materials import Material
 from ..shapes import Disk, Mesh
@@ -151,6 +152,7 @@ FRONT = 0.35, 0.3, 1.0  # direction of the camera that light is relative to by d
 STEEP = 1e-3  # sine between the view and the vertical below which a camera looks straight down
 
 
+@suggests_keywords
 def studio(preset: str = DEFAULT, *, up: ArrayLike = "y", camera: Camera | None = None) -> list[Light]:
     """Return the lights of a preset, to be put into a `Scene`.
 

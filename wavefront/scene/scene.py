@@ -13,11 +13,11 @@ from numpy.typing import ArrayLike
 from ..accel import AcceleratorCache
 from ..arrays.elementary import sin_cos
 from ..arrays.vec import Doubles
-from ..camera import Camera, check_camera, field_of_view, image_size, upward
+from ..camera import Camera, ImageSize, check_camera, field_of_view, image_size, upward
 from ..camera.framing import FILL, Balls, fitting_offset, turned_balls
 from ..core.errors import SceneError, finite_array, in_brief
 from ..core.plural import plural
-from ..core.suggestions import did_you_mean, suggests_keywords
+from ..core.suggestions import Answers, did_you_mean, suggests_keywords
 from ..lights import Environment, Light
 from ..media import BaseMedium
 from ..shapes import Group, Instance, Mesh, PrimitiveArray, Shape
@@ -38,11 +38,12 @@ VIEWS = {
     "bottom": (0.0, -1.0, 0.0),
     "iso": (1.0, 1.0, 1.0),
 }
+VIEW_NAMES = {"isometric": "iso", "side": "right"}  # other names of views
 FRAMING_VIEW = "three_quarter"
 MIN_DISTANCE = 1e-2  # of a framing camera from the center, in radii of the scene
 
 
-class Scene:
+class Scene(Answers):
     """Shapes, lights and a camera.
 
     Parameters
@@ -171,6 +172,7 @@ class Scene:
             raise SceneError(f"medium must be a Medium such as wf.Medium(scattering=0.1), got {medium!r}")
         self._medium = medium
 
+    @suggests_keywords
     def vertical(self, up: ArrayLike = AUTO) -> Doubles:
         """Return the up direction (3,), of any length, given a vector, the name of an axis, or "auto"."""
         if isinstance(up, str) and up == AUTO:
@@ -224,7 +226,7 @@ class Scene:
     def framing_camera(
         self,
         fov: float = FRAMING_FOV,
-        size: tuple[int, int] = (512, 512),
+        size: ImageSize = (512, 512),
         *,
         up: ArrayLike = AUTO,
         direction: ArrayLike = FRAMING_VIEW,
@@ -299,6 +301,8 @@ def view_direction(name: str, view: ArrayLike) -> Doubles:
         If there is no such view, or the vector is malformed or zero.
     """
     if isinstance(view, str):
+        plain = view.strip().lower().replace(" ", "_").replace("-", "_")
+        view = VIEW_NAMES.get(plain, plain if plain in VIEWS else view)
         if view not in VIEWS:
             known = ", ".join(VIEWS)
             hint = did_you_mean(view, VIEWS)
@@ -331,6 +335,8 @@ def register_importer(package: str, convert: Importer) -> None:
 
 def importer(item: Any) -> Importer | None:
     """Return the function that converts an object of another package to a scene, or None."""
+    if isinstance(item, np.ndarray):  # trimesh and PyVista have classes of their own for arrays, too
+        return None
     packages = (kind.__module__.split(".")[0] for kind in type(item).__mro__)
     return next((_IMPORTERS[package] for package in packages if package in _IMPORTERS), None)
 

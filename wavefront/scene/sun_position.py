@@ -11,9 +11,11 @@ from ..arrays.elementary import sin_cos_turns
 from ..arrays.vec import Doubles
 from ..camera import upward
 from ..core.errors import SceneError, finite_array, number
+from ..core.suggestions import suggests_keywords
 from .scene import turned_up
 
 
+@suggests_keywords
 def sun_position(
     time: Any,
     latitude: float,

@@ -13,10 +13,11 @@ from typing import Any, Self, Unpack
 
 from ..aovs.boxes import silhouettes
 from ..arrays.vec import Bools
-from ..camera import Camera, check_camera, image_size
+from ..camera import Camera, ImageSize, check_camera, image_size
 from ..core.errors import RenderError, SaveError, SceneError, warn_caller
 from ..core.interrupt import InterruptHandler
 from ..core.shared import STOP, SharedInt, Stopped
+from ..core.suggestions import suggests_keywords
 from ..film.checkpoint import Checkpoint
 from ..image import Image
 from ..integrators.tuning import TrialJob, TrialPart
@@ -256,7 +257,8 @@ class Session:
             raise RenderError("the render was stopped before there was a picture")
         return image
 
-    def set_camera(self, camera: Camera | None, size: tuple[int, int] | None = None) -> None:
+    @suggests_keywords
+    def set_camera(self, camera: Camera | None, size: ImageSize | None = None) -> None:
         """Begin another picture of the same scene, without compiling it again.
 
         The picture so far is dropped. Workers that have been started continue with the new picture, and
@@ -364,6 +366,7 @@ class Session:
         """
         return self._render.identity()
 
+    @suggests_keywords
     def silhouettes(self, camera: Camera | None = None) -> Iterator[tuple[int, Bools]]:
         """Yield the id of each shape and the pixels (height, width) that it would cover if it were alone.
 

@@ -94,7 +94,9 @@ def check_progress(name: str, value: Any) -> Progress:
 
 
 def check_samples(name: str, value: Any) -> range | None:
-    """Check that something is a range of consecutive numbers from 0 on, or None."""
+    """Check that something is a range of consecutive numbers from 0 on, or None; n means range(n)."""
+    if isinstance(value, int | np.integer) and not isinstance(value, bool) and value > 0:
+        return range(int(value))
     if value is None:
         return None
     if not isinstance(value, range) or value.step != 1 or not value or value.start < 0:

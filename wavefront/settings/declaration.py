@@ -14,7 +14,7 @@ from typing import Annotated, Any, TypedDict, get_args, get_type_hints
 from numpy.typing import ArrayLike
 
 from ..accel.registry import ACCELERATORS, AcceleratorMaker
-from ..camera import Camera, check_camera, field_of_view, image_size
+from ..camera import Camera, ImageSize, check_camera, field_of_view, image_size
 from ..compile.scene import ROULETTE_AFTER
 from ..core.memory import memory_size
 from ..core.progress import Progress
@@ -93,10 +93,11 @@ class RenderSettings(TypedDict, total=False):
         ),
     ]
     size: Annotated[
-        tuple[int, int] | None,
+        ImageSize | None,
         Setting(
             None,
-            "(width, height) in pixels, in place of the camera's; (512, 512) by default.",
+            "(width, height) in pixels, in place of the camera's; (512, 512) by default. One number is a "
+            "square.",
             option="WIDTHxHEIGHT in pixels (default: the camera's, or 512x512)",
             check=optional(lambda name, value: image_size(value)),
         ),
@@ -239,7 +240,7 @@ class RenderSettings(TypedDict, total=False):
         ),
     ]
     samples: Annotated[
-        range | None,
+        range | int | None,
         Setting(
             None,
             "The samples to render, as a range of their numbers, in place of `spp`: range(0, 64) on one "

@@ -95,7 +95,8 @@ class Settings:
     @property
     def first_sample(self) -> int:
         """Index of the first sample of every pixel."""
-        return 0 if self.values["samples"] is None else self.values["samples"].start
+        samples = self.values["samples"]
+        return samples.start if isinstance(samples, range) else 0
 
     @property
     def background_color(self) -> Floats | None:
@@ -171,8 +172,9 @@ class Settings:
     def _most_samples(self) -> int:
         ways = self.most_branches * (SHARED_WAYS if self.values["reuse"] is True else 1)
         most = min(MAX_TERMS, MAX_BRANCH_SAMPLES // ways)
-        if self.values["samples"] is not None:
-            return self._chosen_samples(self.values["samples"], most)
+        samples = self.values["samples"]
+        if isinstance(samples, range):
+            return self._chosen_samples(samples, most)
         if self.values["spp"] is not None:
             return int(whole_number(1, most)("spp", self.values["spp"]))
         if self.values["seconds"] is not None:

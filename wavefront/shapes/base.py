@@ -12,6 +12,7 @@ from ..arrays.vec import Doubles
 from ..bsdfs import Diffuse
 from ..core.errors import number
 from ..core.parameter import Parameter
+from ..core.suggestions import Answers, suggests_keywords
 from ..materials import Material, MaterialLike, as_material
 from .transform import rotation, scaling, translation
 
@@ -24,7 +25,7 @@ class Checked(Parameter[Any]):
         vars(instance)[self._name] = self.convert(f"{instance.name}: {self._name}", value)
 
 
-class Shape(ABC):
+class Shape(Answers, ABC):
     """Base class of shapes: a `Mesh`, an `Instance`, or one of curved primitives, such as a `Sphere`.
 
     Attributes
@@ -115,6 +116,7 @@ class Shape(ABC):
         """
         return self.transformed(translation(f"{self.name}: offset", offset))
 
+    @suggests_keywords
     def rotated(self, axis: ArrayLike, degrees: float, about: ArrayLike = (0, 0, 0)) -> Self:
         """Return a copy that is rotated about an axis, counter-clockwise as seen against the axis.
 

@@ -9,6 +9,7 @@ import numpy as np
 
 from ..arrays.vec import Bools, Doubles, Floats
 from ..core.errors import SceneError, number
+from ..core.suggestions import suggests_keywords
 from .scatter import Scatter, sums_by_label
 from .student_t import t_quantile
 
@@ -34,6 +35,7 @@ class RegionMean:
     pixels: int  # in the region
     error_absent: str = ""  # the reason why there is no standard error
 
+    @suggests_keywords
     def interval(self, confidence: float = 0.95) -> tuple[Doubles, Doubles]:
         """Return the confidence interval of the converged mean: lower and upper limit, (3,) each.
 

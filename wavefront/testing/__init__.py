@@ -1,4 +1,4 @@
-"""Checks of BSDFs, lights, phase functions and warps, for users and for the tests.
+"""Checks of BSDFs, lights, phase functions, warps and pictures, for users and for the tests.
 
 Examples
 --------
@@ -10,7 +10,8 @@ True
 from .bsdf import check_bsdf
 from .light import check_light
 from .phase import check_phase
+from .picture import assert_same_picture
 from .report import Check, Report
 from .warp import check_warp
 
-__all__ = ["Check", "Report", "check_bsdf", "check_light", "check_phase", "check_warp"]
+__all__ = ["Check", "Report", "assert_same_picture", "check_bsdf", "check_light", "check_phase", "check_warp"]

@@ -202,7 +202,7 @@ def _check_arrays(report: Report, view: _View, rng: np.random.Generator) -> None
 
     bound, wo = view.at(n)
     for name, array, shape in (("f()", bound.f(wo, w), (3, n)), ("pdf()", bound.pdf(wo, w), (n,))):
-        _check_array(report, where, name, array, shape, f4)
+        check_array(report, where, name, array, shape, f4)
 
     def run(lanes: slice) -> list[NDArray[Any]]:
         drawn = view.sample(np.ascontiguousarray(u[:, lanes]))
@@ -211,6 +211,9 @@ def _check_arrays(report: Report, view: _View, rng: np.random.Generator) -> None
         f, pdf = bound.evaluate(wo, w_part)
         return [drawn.wi, drawn.weight, drawn.pdf, drawn.specular, view.f(w_part), view.pdf(w_part), f, pdf]
 
+    eta = view.sample(u).eta
+    if eta is not None:
+        check_array(report, where, "eta", eta, (n,), f4)
     names = ["wi", "weight", "pdf", "specular", "f()", "pdf()", "evaluate() f", "evaluate() pdf"]
     rows = [3, 3, 0, 0, 3, 0, 3, 0]
     whole = run(slice(0, n))
@@ -218,7 +221,7 @@ def _check_arrays(report: Report, view: _View, rng: np.random.Generator) -> None
     for k, (name, row) in enumerate(zip(names, rows, strict=True)):
         shape = (row, n) if row else (n,)
         dtype = np.bool_ if name == "specular" else f4
-        _check_array(report, where, name, whole[k], shape, dtype)
+        check_array(report, where, name, whole[k], shape, dtype)
         joined = np.concatenate([part[k] for part in parts], axis=-1)
         report.holds("lanes independent", f"{where}, {name}", joined != whole[k], "the same bits")
     for k, (plain, joint) in enumerate(((4, 6), (5, 7))):
@@ -226,7 +229,7 @@ def _check_arrays(report: Report, view: _View, rng: np.random.Generator) -> None
         report.at_most("evaluate = f, pdf", f"{where}, {('f', 'pdf')[k]}", float(error.max()), 1e-5)
 
 
-def _check_array(
+def check_array(
     report: Report, where: str, name: str, array: Any, shape: tuple[int, ...], dtype: type[np.generic]
 ) -> None:
     """Check the shape and type of one array; without these, nothing else can be checked."""

@@ -17,10 +17,12 @@ from ..lights.base import LightRecord, LightSample, emitters_of
 from ..scene import Scene
 from ..stages.interaction import interaction
 from ..stages.intersect import intersect
-from .bsdf import chunk_sizes
+from .bsdf import check_array, chunk_sizes
 from .charts import CHARTS
 from .chi2 import check_density
 from .report import PILOT, Report
+
+ARRAYS = 100  # samples of which shapes and types are checked
 
 
 def check_light(
@@ -104,6 +106,7 @@ def _check_light_at(
     def density(w: Floats) -> Floats:
         return light.pdf_li(np.repeat(point, w.shape[1], 1), w)
 
+    _check_arrays(report, where, draw(ARRAYS), density, radiance)
     points = []
     for size in chunk_sizes(samples):
         drawn = draw(size)
@@ -115,6 +118,22 @@ def _check_light_at(
     kept = pilot.wi[:, pilot.pdf > 0]
     joined = np.concatenate(points, axis=1)
     check_density(report, where, CHARTS["sphere"], kept, joined, samples, density, alpha)
+
+
+def _check_arrays(
+    report: Report,
+    where: str,
+    drawn: LightSample,
+    density: Callable[[Floats], Floats],
+    radiance: Callable[[Floats], Floats],
+) -> None:
+    """Check shapes and types; accelerators take no others than float32."""
+    for name, rows in (("wi", 3), ("distance", 0), ("radiance", 3), ("pdf", 0)):
+        array, shape = getattr(drawn, name), (3, ARRAYS) if rows else (ARRAYS,)
+        check_array(report, where, f"sample_li().{name}", array, shape, f4)
+    wi = np.ascontiguousarray(drawn.wi)
+    check_array(report, where, "pdf_li()", density(wi), (ARRAYS,), f4)
+    check_array(report, where, "le()", radiance(wi), (3, ARRAYS), f4)
 
 
 def _check_light_samples(

@@ -6,9 +6,10 @@ from abc import ABC, abstractmethod
 
 from ..arrays.state import SurfaceInteraction
 from ..arrays.vec import Floats
+from ..core.suggestions import Answers
 
 
-class BaseTexture(ABC):
+class BaseTexture(Answers, ABC):
     """A parameter of materials and lights that varies over surfaces, such as an image.
 
     Examples

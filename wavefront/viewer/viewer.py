@@ -12,6 +12,7 @@ from typing import Any, Self, Unpack
 from ..camera import Camera
 from ..codecs.tone import TONES
 from ..core.errors import RenderError, SceneError, one_of
+from ..core.suggestions import suggests_keywords
 from ..image import Image
 from ..io.to_scene import as_scene, choose_camera
 from ..scene import Scene
@@ -120,6 +121,7 @@ class Viewer:
         """The newest picture; None if there is none yet."""
         return None if self._latest is None else self._latest.image
 
+    @suggests_keywords
     def wait_for_picture(self, timeout: float | None = None) -> Image:
         """Wait until the picture of the view is done, and return it.
 
