@@ -101,7 +101,10 @@ BAD = {
     "size three numbers": ({"size": (5, 5, 3)}, r"size must be \(width, height\)"),
     "size text": ({"size": "5x"}, r"size is '5x'; both must be"),
     "size NaN": ({"size": (np.nan, 5)}, r"size must be \(width, height\)"),
-    "size infinite": ({"size": (np.inf, 5)}, r"size must be \(width, height\) or one number for both, got \(inf, 5\)"),
+    "size infinite": (
+        {"size": (np.inf, 5)},
+        r"size must be \(width, height\) or one number for both, got \(inf, 5\)",
+    ),
 }
 
 

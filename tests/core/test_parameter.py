@@ -119,7 +119,12 @@ def wf_parameters(kind: type) -> list[str]:
         (wf.DirectionalLight((0, 0, 1), 1), "angle", -3, r"DirectionalLight angle is -3"),
         (wf.Environment(), "radiance", -1, r"Environment radiance is -1; it must be at least 0"),
         (wf.Sphere((0, 0, 0), 1, name="sun"), "emission", -1, r"sun: emission is -1"),
-        (wf.Sphere((0, 0, 0), 1, name="sun"), "material", "reed", r"sun: material is 'reed'; it must be one of"),
+        (
+            wf.Sphere((0, 0, 0), 1, name="sun"),
+            "material",
+            "reed",
+            r"sun: material is 'reed'; it must be one of",
+        ),
         (wf.Mesh(np.eye(3), [[0, 1, 2]], name="roof"), "emission", "x", r"roof: emission is 'x'"),
         (wf.Mesh(np.eye(3), [[0, 1, 2]], name="roof"), "material", 1, r"roof: material must be a material"),
     ],
