@@ -244,7 +244,7 @@ def test_bad_faces_are_dropped_and_counted(write, case):
 
 def test_nothing_left_is_an_error(write):
     path = write(SQUARE + "f 1 1 2\n")
-    with pytest.raises(SceneError, match="has no faces"), pytest.warns(UserWarning, match="1 face "):
+    with pytest.raises(SceneError, match="has no faces: 1 face of zero area, first: line 5; left out"):
         load_meshes(path)
 
 

@@ -233,7 +233,7 @@ def test_memory_of_accessors_is_checked_before_it_is_taken(tmp_path: Path) -> No
     budget = 30_000 * 3 * 20 - 128 * path.stat().st_size
     with pytest.raises(wf.SceneError, match=rf"the limit is {30_000 * 60 - 1} "):
         wf.load(path, limits=wf.LoadLimits(memory_bytes=budget - 1))
-    with pytest.raises(wf.SceneError, match="has no faces"), pytest.warns(UserWarning, match="zero area"):
+    with pytest.raises(wf.SceneError, match=r"has no faces: .* of zero area"):
         wf.load(path, limits=wf.LoadLimits(memory_bytes=budget))
 
 

@@ -8,6 +8,7 @@ import struct
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 
 import wavefront as wf
@@ -75,12 +76,53 @@ def test_whoever_warns_within_a_load_is_on_its_list() -> None:
     assert [each.part for each in outer.found] == ["the image is torn", "b.ply: not honored: x of vertex"]
 
 
-def test_an_error_does_not_hide_what_was_noted() -> None:
-    failing, why = "a.obj: has no faces", ("1 face of zero area", "", "", "left out")
-    with pytest.raises(wf.SceneError, match=failing), pytest.warns(UserWarning, match="1 face of zero area"):
-        noted(Losses("a.obj"), why, error=failing)
-    with pytest.raises(wf.SceneError, match=failing):
-        noted(Losses("a.obj", strict=True), why, error=failing)
+def test_an_error_says_why_nothing_is_shown() -> None:
+    losses = Losses("a.obj")
+    assert str(losses.nothing("has no faces")) == "a.obj: has no faces"
+    losses.note("1 face of zero area", done="left out")
+    assert str(losses.nothing("has no faces")) == "a.obj: has no faces: 1 face of zero area; left out"
+    losses.note("l", "line 3")
+    lines = str(losses.nothing("has no faces")).splitlines()
+    assert lines == ["a.obj: has no faces:", "  1 face of zero area; left out", "  not honored: line 3: l"]
+    with pytest.raises(wf.SceneError, match="no end"):
+        noted(losses, error="a.obj: has no end")  # without a warning
+
+
+def test_an_error_costs_a_part_but_where_a_limit_is_passed() -> None:
+    losses = Losses("a.glb")
+    with losses.part("meshes[1]", "a cube in its place"):
+        raise wf.SceneError("a.glb: meshes[1]: has no name")
+    assert losses.found == (wf.Loss("a.glb: meshes[1]", "has no name", done="a cube in its place"),)
+
+    def passing() -> None:
+        with losses.part("meshes[2]"):
+            try:
+                wf.LoadLimits(meshes=1).check_meshes("a.glb", 2)
+            except wf.SceneError as error:
+                raise wf.SceneError("a.glb: meshes[2]: is too large") from error
+
+    with pytest.raises(wf.SceneError, match="too large"):
+        passing()
+    assert len(losses.found) == 1
+
+
+@pytest.mark.parametrize(
+    ("value", "low", "high", "shown"),
+    [
+        (1.00016, 0, 1, "is 1.00016; clamped to 1"),
+        (-1e-9, 0, 1, "is -1e-09; clamped to 0"),
+        (float(np.float32(np.pi / 2)), 0, np.pi / 2, "is 1.5707963705062866; clamped to 1.5707963267948966"),
+        ([0.5, 1.0000001, 1], 0, 1, "is 0.5 1.0000001 1; clamped to 0.5 1 1"),
+        ([3, -1], 0, np.inf, "is 3 -1; clamped to 3 0"),
+    ],
+)
+def test_numbers_are_clamped_and_shown_with_the_digits_that_matter(value, low, high, shown) -> None:
+    losses = Losses("a.glb")
+    kept = losses.within("factor", value, low, high)
+    assert (kept == np.clip(value, low, high)).all()
+    assert [each.said("a.glb") for each in losses.found] == [f"factor {shown}"]
+    losses.within("factor", kept, low, high)
+    assert len(losses.found) == 1
 
 
 def test_a_scene_keeps_what_its_file_lost(tmp_path: Path) -> None:

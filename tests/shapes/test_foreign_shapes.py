@@ -194,10 +194,7 @@ def test_files_of_points_become_spheres(tmp_path: Path, kind: str, colors: bool)
         assert wf.render(str(file), 1, size=(8, 8), lighting="cloudy", material="gold").shape == (8, 8, 3)
     with pytest.raises(wf.SceneError, match="has no faces; 120 points"):
         wf.load(file, strict=True)
-    with (
-        pytest.raises(wf.SceneError, match="is a Spheres, not a mesh"),
-        pytest.warns(UserWarning, match="become"),
-    ):
+    with pytest.raises(wf.SceneError, match="is a Spheres, not a mesh"):
         wf.load_mesh(file)
 
 

@@ -9,7 +9,7 @@ from __future__ import annotations
 import zipfile
 from collections.abc import Sequence
 
-from ..core.errors import SceneError
+from ..core.errors import LimitError, SceneError
 
 METHODS = (zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED)
 OTHERS = {zipfile.ZIP_BZIP2: "bzip2", zipfile.ZIP_LZMA: "lzma", 93: "zstd"}
@@ -27,7 +27,7 @@ def checked_members(archive: zipfile.ZipFile, most: int) -> Sequence[zipfile.Zip
     """
     members = archive.infolist()
     if len(members) > most:
-        raise SceneError(f"has {len(members)} members; the limit is {most}")
+        raise LimitError(f"has {len(members)} members; the limit is {most}")
     seen = set()
     for member in members:
         name = member.filename

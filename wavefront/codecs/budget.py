@@ -6,7 +6,7 @@ import os
 from collections.abc import Iterator
 from contextlib import contextmanager
 
-from ..core.errors import SceneError
+from ..core.errors import LimitError
 from ..core.files import MAX_PIXELS, check_size
 from ..core.plural import plural
 
@@ -21,7 +21,7 @@ def in_memory(path: str | os.PathLike[str]) -> Iterator[None]:
         yield
     except MemoryError as error:
         has = f"has {plural(os.path.getsize(path), 'byte')}, and what it holds"
-        raise SceneError(f"{os.fspath(path)}: {has} does not fit in memory: {error}") from error
+        raise LimitError(f"{os.fspath(path)}: {has} does not fit in memory: {error}") from error
 
 
 class Budget:
@@ -66,7 +66,7 @@ class Budget:
         self._charged += size
         if self._charged > self._most:
             so_far = "" if self._charged == size else f", which makes {self._charged} in all"
-            raise SceneError(
+            raise LimitError(
                 f"{what} takes {plural(size, 'byte')} of memory{so_far}; "
                 f"the limit is {self._most} for files of this size (LoadLimits.memory_bytes)"
             )

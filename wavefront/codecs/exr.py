@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..arrays.vec import Floats
-from ..core.errors import SaveError, SceneError
+from ..core.errors import LimitError, SaveError, SceneError
 from ..core.files import MAX_PIXELS
 from ..film.aov_names import components
 from .budget import Budget
@@ -206,7 +206,7 @@ def _check_header(parts: list[Any], size: int, budget: Budget) -> None:
         budget.check_size(height, width)
         values += height * width * len(part.header["channels"])
     if values > most:
-        raise SceneError(
+        raise LimitError(
             f"claims {values} values in {len(parts)} parts; the limit is {most} for a file of {size} bytes"
         )
     height, width = _window(parts[0])

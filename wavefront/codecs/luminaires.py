@@ -19,7 +19,7 @@ from pathlib import Path
 import numpy as np
 
 from ..arrays.vec import Doubles
-from ..core.errors import SceneError, warn_caller
+from ..core.errors import SceneError, exact, warn_caller
 from ..core.files import decode_text, extension_of, path_name, read_bytes
 from ..core.plural import plural
 from ..core.references import followed
@@ -79,7 +79,7 @@ class _Numbers:
         value = float(self.take(what, 1, least, most)[0])
         if not value.is_integer():
             line = self.found[self.at - 1][0]
-            raise SceneError(f"{self.name} line {line}: {what} is {value:g}; it must be whole")
+            raise SceneError(f"{self.name} line {line}: {what} is {exact(value)}; it must be whole")
         return int(value)
 
     def angles(self, what: str, count: int, low: float, high: float) -> Doubles:

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ..arrays.vec import Floats, f4
-from ..core.errors import SceneError, as_array, finite_array, in_brief
+from ..core.errors import SceneError, as_array, exact, finite_array, in_brief
 from .names import CSS_COLORS
 from .transfer import srgb_to_linear
 
@@ -71,7 +71,7 @@ def rgb(
         limit = f"in [0, {high:g}]"
         if np.isinf(high):
             limit = "at least 0" if array.flat[bad[0]] < 0 else f"at most {largest:.3g}"
-        raise SceneError(f"{name}{where} is {array.flat[bad[0]]:g}; it must be {limit}")
+        raise SceneError(f"{name}{where} is {exact(array.flat[bad[0]])}; it must be {limit}")
     return np.broadcast_to(array.astype(dtype).reshape(-1, 1), (3, 1)).copy()
 
 
@@ -130,10 +130,9 @@ def srgb(*color: Any) -> Floats:
     if len(bad):
         where = "".join(f"[{i}]" for i in bad[0])
         hint = ". Values from 0 to 255 are passed as a uint8 array, or divided by 255"
-        large = 1 < values[tuple(bad[0])] <= 255
-        raise SceneError(
-            f"srgb color{where} is {values[tuple(bad[0])]:g}; it must be in [0, 1]{hint if large else ''}"
-        )
+        value = values[tuple(bad[0])]
+        more = hint if 1 < value <= 255 else ""
+        raise SceneError(f"srgb color{where} is {exact(value)}; it must be in [0, 1]{more}")
     values[..., :3] = srgb_to_linear(values[..., :3])
     return values
 

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from ..arrays.elementary import exp
 from ..arrays.vec import Doubles, f4
-from ..core.errors import SceneError, finite_array, number
+from ..core.errors import SceneError, exact, finite_array, number
 
 FIRST, STEP = 380, 5  # nm, of the tables
 # color matching functions of CIE 1931, 2 degrees, and the power of D65 relative to 560 nm (CIE 15:2018)
@@ -126,7 +126,7 @@ def blackbody_colors(temperature: NDArray[Any]) -> Doubles:
     """
     most = float(temperature.max(initial=0))
     if most > HOTTEST:
-        raise SceneError(f"temperature is {most:g} kelvin; it must be at most {HOTTEST:g}")
+        raise SceneError(f"temperature is {exact(most)} kelvin; it must be at most {HOTTEST:g}")
     if most <= COLDEST:
         return np.zeros((*temperature.shape, 3))
     kelvin = np.linspace(COLDEST, most, TABULATED)

@@ -54,6 +54,17 @@ class SceneError(ValueError):
         super().__init__(plain(message))
 
 
+class LimitError(SceneError):
+    """What a limit does not allow, such as one of `LoadLimits`: no part of a file is left out for it."""
+
+
+def passed_limit(error: BaseException | None) -> bool:
+    """Return whether an error, or one that it follows from, is a `LimitError`."""
+    while error is not None and not isinstance(error, LimitError):
+        error = error.__cause__
+    return error is not None
+
+
 class SaveError(SceneError, OSError):
     """A file that cannot be written. The old file, if there was one, is intact.
 
@@ -177,6 +188,12 @@ def in_brief(value: Any) -> str:
         return f"an array of shape {value.shape}"
     text = " ".join(repr(value).split())
     return text if len(text) <= MOST_LETTERS else f"{text[:MOST_LETTERS]}…"
+
+
+def exact(value: Any) -> str:
+    """Return a number with as many digits as tell it from all others of its type, and no more."""
+    text = f"{value:g}"
+    return text if np.asarray(value).dtype.type(float(text)) == value else str(value)
 
 
 def iterable(name: str, value: Any, of: str) -> Iterator[Any]:

@@ -10,7 +10,7 @@ from collections.abc import Callable, Iterable
 from pathlib import Path
 from typing import IO, Any
 
-from .errors import SaveError, SceneError
+from .errors import LimitError, SaveError, SceneError
 from .plural import plural
 
 MAX_BYTES = 2**31  # larger files are refused before they are read
@@ -54,7 +54,7 @@ def check_regular(path: str | os.PathLike[str], limit: float = math.inf) -> None
     if not stat.S_ISREG(info.st_mode):
         raise SceneError(f"{name}: is a device or pipe; only regular files are read")
     if info.st_size > limit:
-        raise SceneError(f"{name}: has {plural(info.st_size, 'byte')}; the limit is {limit}")
+        raise LimitError(f"{name}: has {plural(info.st_size, 'byte')}; the limit is {limit}")
 
 
 def decode_text(data: bytes) -> str:
@@ -74,7 +74,7 @@ def check_size(height: int, width: int, most: float = MAX_PIXELS) -> None:
     if height < 1 or width < 1:
         raise SceneError(f"image has {width} × {height} pixels; it must have at least one")
     if height * width > most:
-        raise SceneError(f"image has {width} × {height} pixels; the limit is {most}")
+        raise LimitError(f"image has {width} × {height} pixels; the limit is {most}")
 
 
 def path_name(path: str | os.PathLike[str], error: type[SceneError] = SceneError) -> str:

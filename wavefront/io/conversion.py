@@ -13,7 +13,7 @@ import numpy as np
 
 from ..arrays.vec import Doubles
 from ..bsdfs import Diffuse, Measured
-from ..core.errors import SceneError, finite_array, in_brief, number, one_of
+from ..core.errors import LimitError, SceneError, finite_array, in_brief, number, one_of
 from ..materials import Material
 from ..media import Isotropic
 from ..textures.base import BaseTexture
@@ -58,7 +58,8 @@ def check_included(place: str, files: SceneFiles, count: int, depth: int) -> Non
     """Refuse a file that is included where there are too many, or too many inside each other."""
     most = files.limits.includes
     if count > most:
-        raise PlacedError(f"{place}: includes more than {most} files; the limit is LoadLimits.includes")
+        error = LimitError(f"{place}: includes more than {most} files; the limit is LoadLimits.includes")
+        raise PlacedError(str(error)) from error
     if depth == MOST_INCLUDED:
         raise PlacedError(f"{place}: files include each other; the limit is {MOST_INCLUDED} levels")
 
@@ -187,7 +188,7 @@ class Conversion(Generic[P]):
         self.instances += count
         most = self.files.limits.instances
         if self.instances > most:
-            raise SceneError(f"there are more than {most} instances; the limit is LoadLimits.instances")
+            raise LimitError(f"there are more than {most} instances; the limit is LoadLimits.instances")
 
 
 def textures_in(thing: Any, kind: type[T] = BaseTexture) -> list[T]:  # type: ignore[assignment]

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from ..camera import Camera
-from ..core.errors import SceneError, printable
+from ..core.errors import LimitError, SceneError, exact, printable
 from ..lights import DirectionalLight, PointLight, SpotLight
 from ..shapes.transform import Matrix
 from .gltf_document import Document, floats, shown
@@ -61,7 +61,7 @@ def contents(document: Document) -> GltfContents:
                 count = count_placements(document, node)
                 total = len(of) + count * len(parts)
                 if total > document.files.limits.instances:
-                    raise SceneError(
+                    raise LimitError(
                         f"its nodes place {total} meshes so far; the limit is "
                         f"{document.files.limits.instances} (LoadLimits.instances)"
                     )
@@ -155,7 +155,7 @@ def _size(aspect: float) -> tuple[int, int]:
 def _positive(lens: dict[str, Any], key: str, default: float | None) -> float:
     value = float(floats(key, [lens.get(key, default)], 1)[0])
     if not 0 < value < 1e30:
-        raise SceneError(f"{key} is {value:g}; it must be above 0")
+        raise SceneError(f"{key} is {exact(value)}; it must be above 0")
     return value
 
 

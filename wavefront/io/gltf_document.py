@@ -18,7 +18,7 @@ from urllib.parse import unquote
 import numpy as np
 from numpy.typing import NDArray
 
-from ..core.errors import SceneError, printable
+from ..core.errors import LimitError, SceneError, printable
 from ..core.plural import plural
 from ..shapes.transform import Matrix
 from .sources import MAX_TRIANGLES, SceneFiles
@@ -175,12 +175,12 @@ class Document:
             )
         scale = max(1, self.files.limits.triangles // MAX_TRIANGLES)  # where the user allows larger meshes
         if count * width > MAX_ELEMENTS * scale:
-            raise SceneError(
+            raise LimitError(
                 f"{self.name}: {where} has {count} elements; the limit is {MAX_ELEMENTS * scale // width}"
             )
         self._numbers += count * width
         if self._numbers > MAX_NUMBERS * scale:
-            raise SceneError(
+            raise LimitError(
                 f"{self.name}: {where}: the accessors that its meshes read have {self._numbers} numbers "
                 f"so far; the limit is {MAX_NUMBERS * scale}"
             )

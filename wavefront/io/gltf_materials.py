@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from ..arrays.elementary import log, sin_cos_turns
 from ..arrays.vec import FLOAT32_MAX, Doubles
 from ..codecs.images import decode_codes
-from ..core.errors import SceneError, printable
+from ..core.errors import LimitError, SceneError, printable
 from ..textures.image import Texture
 from ..textures.normal_map import NormalMap
 from ..textures.parameter import MAX_INDEX
@@ -113,7 +113,7 @@ class GltfMaterials:
         codes = decode_codes(content, name, document.files.budget)
         self._pixels += codes.shape[0] * codes.shape[1]
         if self._pixels > IMAGES * limits.pixels:
-            raise SceneError(
+            raise LimitError(
                 f"{name} brings the images to {self._pixels} pixels in all; "
                 f"the limit is {IMAGES * limits.pixels}"
             )

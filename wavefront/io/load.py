@@ -92,7 +92,7 @@ def load(
         )
         name, contents = path_name(path), read(path, options)
         placed = place_shapes(name, contents.raws, contents.places, losses)
-        shapes = _some(name, [*placed, *contents.shapes])
+        shapes = _some(losses, [*placed, *contents.shapes])
         scene = Scene(
             shapes,
             contents.lights,
@@ -176,7 +176,7 @@ def load_meshes(
 def _meshes(path: PathLike, options: LoadOptions) -> list[Mesh]:
     name, contents = path_name(path), read(path, options)
     placed = place_meshes(name, contents.raws, contents.places, options.losses)
-    return _some(name, [*placed, *(_as_mesh(name, shape) for shape in contents.shapes)])
+    return _some(options.losses, [*placed, *(_as_mesh(name, shape) for shape in contents.shapes)])
 
 
 def _as_mesh(name: str, shape: Shape) -> Mesh:
@@ -234,7 +234,7 @@ def from_trimesh(geometry: Any, *, smooth: bool | float | str = AUTO) -> Scene:
     with Losses(source) as losses:
         contents = trimesh_objects.read(geometry, source, losses)
         contents.smooth(check_smooth("smooth", smooth))
-        shapes = _some(source, place_shapes(source, contents.raws, contents.places, losses))
+        shapes = _some(losses, place_shapes(source, contents.raws, contents.places, losses))
         scene = Scene(shapes, trimesh_view.lights(geometry), up=contents.up)
         trimesh_view.add_camera(scene, geometry)
         scene.losses = losses.found
@@ -285,7 +285,7 @@ def from_mitsuba(
         return made
 
 
-def _some(name: str, shapes: list[T]) -> list[T]:
+def _some(losses: Losses, shapes: list[T]) -> list[T]:
     if not shapes:
-        raise SceneError(f"{name}: has no faces")
+        raise losses.nothing("has no faces")
     return shapes

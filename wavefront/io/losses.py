@@ -9,10 +9,15 @@ passed, or where an argument of a call is wrong.
 
 from __future__ import annotations
 
-from contextlib import ExitStack
+from collections.abc import Iterator
+from contextlib import ExitStack, contextmanager
 from typing import Self
 
-from ..core.errors import SceneError, hear_warnings, warn_caller
+import numpy as np
+from numpy.typing import ArrayLike
+
+from ..arrays.vec import Doubles
+from ..core.errors import SceneError, exact, hear_warnings, passed_limit, warn_caller
 from ..core.plural import plural
 from ..scene.loss import NOT_HONORED, Loss
 
@@ -57,10 +62,41 @@ class Losses:
         """Note a warning that begins with its place."""
         self.note(message.removeprefix(f"{self.name}: "), done="")
 
+    @contextmanager
+    def part(self, place: str = "", done: str = "left out") -> Iterator[None]:
+        """Note an error of the block, which reads a part of the file, and go on without that part.
+
+        Raises
+        ------
+        SceneError
+            If a limit is passed.
+        """
+        try:
+            yield
+        except SceneError as error:
+            if passed_limit(error):
+                raise
+            what = str(error).removeprefix(f"{self.name}: ")
+            self.note(what.removeprefix(f"{place}: "), place, done=done)
+
+    def within(
+        self, part: str, value: ArrayLike, low: float = 0.0, high: float = 1.0, place: str = ""
+    ) -> Doubles:
+        """Return numbers clamped to a range, which is noted: files are often outside of it by rounding."""
+        given = np.asarray(value, np.float64)
+        limited = np.clip(given, low, high)
+        if (limited != given).any():
+            self.note(part, place, _text(given), f"clamped to {_text(limited)}")
+        return limited
+
     @property
     def found(self) -> tuple[Loss, ...]:
         """All that was noted, each once."""
         return tuple(self._noted)
+
+    def nothing(self, what: str) -> SceneError:
+        """Return an error of a file of which nothing is shown; it says why."""
+        return SceneError(self._message(what) if self._noted else f"{self.name}: {what}")
 
     def report(self) -> None:
         """Warn of all that was noted, if anything was.
@@ -70,17 +106,18 @@ class Losses:
         SceneError
             If `strict`.
         """
+        if self._noted and self.strict:
+            raise SceneError(self._message())
+        if self._noted:
+            warn_caller(self._message())
+
+    def _message(self, what: str = "") -> str:
         lines = self._lines()
-        if not lines:
-            return
-        message = f"{self.name}: {lines[0]}"
-        if len(lines) > 1:
-            more = [f"and {len(lines) - MOST_SHOWN} more"] if len(lines) > MOST_SHOWN else []
-            head = f"{self.name}: {plural(len(lines), 'thing')} not as in the file:"
-            message = "\n  ".join([head, *lines[:MOST_SHOWN], *more])
-        if self.strict:
-            raise SceneError(message)
-        warn_caller(message)
+        if len(lines) == 1:
+            return ": ".join([self.name, *([what] if what else []), lines[0]])
+        more = [f"and {len(lines) - MOST_SHOWN} more"] if len(lines) > MOST_SHOWN else []
+        head = f"{self.name}: {what or plural(len(lines), 'thing') + ' not as in the file'}:"
+        return "\n  ".join([head, *lines[:MOST_SHOWN], *more])
 
     def _lines(self) -> list[str]:
         """Return what was noted as text; the same at several places is one line with their number."""
@@ -99,7 +136,11 @@ class Losses:
         return self
 
     def __exit__(self, kind: type[BaseException] | None, *_: object) -> None:
-        """Say what was noted: it may also be why the block failed."""
+        """Say what was noted, unless the block failed."""
         self._stack.close()
-        if kind is None or (issubclass(kind, SceneError) and not self.strict):
+        if kind is None:
             self.report()
+
+
+def _text(values: Doubles) -> str:
+    return exact(values.item()) if values.size == 1 else " ".join(map(exact, values.ravel().tolist()))

@@ -43,7 +43,7 @@ from numpy.typing import NDArray
 
 from ..arrays.vec import Doubles
 from ..bsdfs import Dielectric, Diffuse, Mirror
-from ..core.errors import SceneError, printable
+from ..core.errors import SceneError, exact, printable
 from ..materials import Material
 from ..textures.image import StoredImage, Texture
 from ..textures.normal_map import BaseNormalMap, BumpMap, NormalMap
@@ -356,7 +356,7 @@ def _exponent(entry: Entry) -> float:
     """Return `Ns`, clamped to [0, `LARGEST_NS`]: larger values do not sharpen the highlight."""
     value = entry.number("ns", 0.0)
     if value < 0:
-        entry.note("ns", f"{value:g}", "clamped, as it must be at least 0")
+        entry.note("ns", exact(value), "clamped, as it must be at least 0")
     return min(max(value, 0.0), LARGEST_NS)
 
 
@@ -443,7 +443,7 @@ def _glass(entry: Entry) -> Dielectric:
     ior = entry.number("ni", GLASS_IOR)
     if not 1 / MAX_INDEX <= ior <= MAX_INDEX:
         limits = f"above 0, from {1 / MAX_INDEX:g} to {MAX_INDEX:g}"
-        raise SceneError(f"{entry.where('ni')} is {ior:g}; an index must be {limits}")
+        raise SceneError(f"{entry.where('ni')} is {exact(ior)}; an index must be {limits}")
     entry.read.update(("d", "tr", "kd"))  # glass has no matte part, but files give it a Kd
     return Dielectric(ior, _part(entry, "pr", 0.0), transmittance=entry.color("tf", 1.0))
 
@@ -452,7 +452,7 @@ def _part(entry: Entry, key: str, default: float) -> float:
     """Return a number in [0, 1], clamped with a warning."""
     value = entry.number(key, default)
     if not 0 <= value <= 1:
-        entry.note(key, f"{value:g}", "clamped, as it must be in [0, 1]")
+        entry.note(key, exact(value), "clamped, as it must be in [0, 1]")
     return min(max(value, 0.0), 1.0)
 
 

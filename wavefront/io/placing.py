@@ -7,7 +7,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from ..arrays.vec import Bools, Ints
-from ..core.errors import SceneError
+from ..core.errors import LimitError, SceneError
 from ..shapes import Instance, Mesh
 from ..shapes.instance import can_place
 from ..shapes.transform import Matrix, moved, moved_tangents
@@ -70,7 +70,7 @@ def place_shapes(name: str, raws: list[RawMesh], places: Places, losses: Losses)
             shapes[i] = instance
         copies += len(at) - len(instances)
         if copies > MAX_COPIES:
-            raise SceneError(
+            raise LimitError(
                 f"{name}: {raw.name!r} brings the meshes whose matrices are singular to {copies}; "
                 f"the limit is {MAX_COPIES}"
             )
@@ -88,7 +88,7 @@ def place_meshes(name: str, raws: list[RawMesh], places: Places, losses: Losses)
     sizes = np.array([len(raw.faces) for raw in raws], np.int64)
     total = int(sizes.take(places.raw).sum())
     if total > sizes.sum() + MAX_COPIED_FACES:
-        raise SceneError(
+        raise LimitError(
             f"{name}: its {len(places.raw)} instances have {total} triangles together, "
             f"its meshes {sizes.sum()}; as meshes of their own, at most {MAX_COPIED_FACES} are copied"
         )

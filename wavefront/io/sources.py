@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from ..codecs.archive import PIECE
 from ..codecs.budget import MEMORY_BYTES, Budget
 from ..codecs.images import read_codes
-from ..core.errors import SceneError
+from ..core.errors import LimitError, SceneError
 from ..core.files import MAX_BYTES, MAX_PIXELS, check_regular, path_name, read_bytes
 from ..core.references import GZIPPED, followed
 from .losses import Losses
@@ -91,12 +91,12 @@ class LoadLimits:
     def check_meshes(self, name: str, count: int) -> None:
         """Refuse a file of more meshes with a SceneError."""
         if count > self.meshes:
-            raise SceneError(f"{name}: has {count} meshes; the limit is {self.meshes} (LoadLimits.meshes)")
+            raise LimitError(f"{name}: has {count} meshes; the limit is {self.meshes} (LoadLimits.meshes)")
 
     def check_triangles(self, name: str, count: int) -> None:
         """Refuse a file of more triangles with a SceneError."""
         if count > self.triangles:
-            raise SceneError(
+            raise LimitError(
                 f"{name}: has {count} triangles; the limit is {self.triangles} (LoadLimits.triangles)"
             )
 
@@ -186,7 +186,7 @@ class SceneFiles:
         except (OSError, zlib.error) as error:
             raise SceneError(f"{name}: is no gzip file: {error}") from error
         if size > most:
-            raise SceneError(f"{name}: has more than {most} bytes unpacked (LoadLimits.unpacked_bytes)")
+            raise LimitError(f"{name}: has more than {most} bytes unpacked (LoadLimits.unpacked_bytes)")
         return content.getvalue()
 
     def image(self, path: Path) -> NDArray[Any]:

@@ -16,7 +16,7 @@ from ..arrays.vec import Ints
 from ..bsdfs import Diffuse
 from ..codecs.archive import checked_members, unpacked
 from ..colors import srgb
-from ..core.errors import SceneError
+from ..core.errors import LimitError, SceneError
 from ..materials import Material
 from ..shapes.transform import IDENTITY, Matrix
 from .appearance import MaterialSpec, assign_material
@@ -66,7 +66,7 @@ def _models(files: SceneFiles, data: bytes) -> dict[str, bytearray]:
             members = checked_members(archive, MAX_MEMBERS)
             size = sum(member.file_size for member in members)
             if size > most:
-                raise SceneError(f"unpacks to {size} bytes; the limit is {most} (LoadLimits.unpacked_bytes)")
+                raise LimitError(f"unpacks to {size} bytes; the limit is {most} (LoadLimits.unpacked_bytes)")
             root = next((each for each in members if ROOT in each.filename.lower()), None)
             if root is None:
                 raise SceneError(f"has no member {ROOT!r}")

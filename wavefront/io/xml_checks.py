@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from xml.parsers import expat
 
-from ..core.errors import SceneError
+from ..core.errors import LimitError, SceneError
 
 MAX_DEPTH = 128  # nesting of nodes
 MAX_EXPANDED = 2**31  # bytes of a file with every reference replaced by its target
@@ -61,7 +61,7 @@ def check_expanded(name: str, children: Mapping[str, list[str]], sizes: Mapping[
     """
     size = total(name, children, lambda node: sizes.get(node, 0) + NODE_BYTES, root)
     if size > MAX_EXPANDED:
-        raise SceneError(
+        raise LimitError(
             f"{name}: its nodes refer to each other so often that they stand for {size} bytes; "
             f"the limit is {MAX_EXPANDED}"
         )

@@ -17,7 +17,7 @@ from numpy.typing import ArrayLike
 from ..arrays.soa import soa
 from ..arrays.state import SoA, SurfaceInteraction
 from ..arrays.vec import Bools, Doubles, Floats, Ints, Lanes, f4
-from ..core.errors import SceneError, finite_array
+from ..core.errors import SceneError, exact, finite_array
 from ..film.aov_names import DEFAULT_GROUP
 from ..shapes import Shape
 
@@ -308,11 +308,11 @@ def emitters_of(light: LightRecord) -> Emitters:
     finite_array(f"{name}' extent2", np.where(extent2 == np.inf, 0, extent2), (k,))
     if (extent2 < 0).any():
         at = int(extent2.argmin())
-        raise SceneError(f"{name}' extent2[{at}] is {extent2[at]:g}; it must be at least 0")
+        raise SceneError(f"{name}' extent2[{at}] is {exact(extent2[at])}; it must be at least 0")
     length2 = (facing * facing).sum(0)
     if (length2 > 1 + 1e-3).any():
         at = int(length2.argmax())
         raise SceneError(
-            f"{name}' facing[:, {at}] has the length {np.sqrt(length2[at]):g}; it must be at most 1"
+            f"{name}' facing[:, {at}] has the length {exact(np.sqrt(length2[at]))}; it must be at most 1"
         )
     return Emitters(middle, facing, extent2)

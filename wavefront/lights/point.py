@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike
 from ..arrays.soa import soa
 from ..arrays.vec import FLOAT32_MAX, Bools, Doubles, Floats, dot, f4
 from ..colors import rgb
-from ..core.errors import SceneError, as_array, finite_array
+from ..core.errors import SceneError, as_array, exact, finite_array
 from ..core.parameter import Parameter, Parametrized, parametrized
 from ..film.aov_names import DEFAULT_GROUP, group_name
 from .base import DeltaLight, Emitters, Light, LightSample, position
@@ -155,7 +155,7 @@ def intensities_of(name: str, value: ArrayLike) -> Doubles:
     bad = np.argwhere(array < 0)
     if len(bad):
         where = "".join(f"[{i}]" for i in bad[0])
-        raise SceneError(f"{name}{where} is {array[tuple(bad[0])]:g}; it must be at least 0")
+        raise SceneError(f"{name}{where} is {exact(array[tuple(bad[0])])}; it must be at least 0")
     return array
 
 

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..arrays.vec import Doubles, f4
-from ..core.errors import SceneError, finite_array
+from ..core.errors import SceneError, exact, finite_array
 from ..core.files import decode_text, read_bytes
 from ..core.suggestions import suggests_keywords
 from ..lights import SkyPatches
@@ -58,7 +58,7 @@ class Weather:
         ):
             if (values < 0).any():
                 at = int(values.argmin())
-                raise SceneError(f"{name}[{at}] is {values[at]:g}; it must be at least 0")
+                raise SceneError(f"{name}[{at}] is {exact(values[at])}; it must be at least 0")
         length = np.sqrt((given * given).sum(1, keepdims=True))
         if not length.all():
             raise SceneError(f"sun[{int(length.argmin())}] is zero; it must have a direction")

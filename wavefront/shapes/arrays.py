@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..arrays.vec import FLOAT32_MAX, Doubles
-from ..core.errors import SceneError, as_array, finite_array
+from ..core.errors import SceneError, as_array, exact, finite_array
 from ..materials import MaterialLike
 from .base import Checked, CurvedShape
 from .colored import ColoredShape
@@ -25,7 +25,7 @@ def _radii(name: str, value: ArrayLike) -> Doubles:
     if len(bad):
         where = f"[{bad[0]}]" if not single else ""
         limit = f"above 0, from {FLOAT32_MIN:.3g} to {FLOAT32_MAX:.3g}"
-        raise SceneError(f"{name}{where} is {radii[bad[0]]:g}; it must be {limit}")
+        raise SceneError(f"{name}{where} is {exact(radii[bad[0]])}; it must be {limit}")
     return radii
 
 

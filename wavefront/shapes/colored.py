@@ -8,7 +8,7 @@ from numpy.typing import ArrayLike
 from ..arrays.vec import Doubles, f4
 from ..bsdfs import Diffuse
 from ..colors import named_rows, srgb_to_linear, warn_of_colormap
-from ..core.errors import SceneError, finite_array
+from ..core.errors import SceneError, exact, finite_array
 from ..core.plural import plural
 from ..materials import Material
 from ..textures.vertex_colors import VertexColors
@@ -33,7 +33,7 @@ def linear_colors(name: str, values: ArrayLike | None) -> Doubles | None:
     bad = np.argwhere((array < 0) | (array > 1))
     if len(bad):
         i, j = bad[0]
-        raise SceneError(f"{name}[{i}][{j}] is {array[i, j]:g}; it must be in [0, 1], or uint8")
+        raise SceneError(f"{name}[{i}][{j}] is {exact(array[i, j])}; it must be in [0, 1], or uint8")
     if codes is not None:
         warn_of_colormap(name, np.asarray(values))
     return array if array.shape[1] == 4 else np.column_stack([array, np.ones(len(array))])

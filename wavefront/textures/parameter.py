@@ -14,7 +14,7 @@ from numpy.typing import ArrayLike
 from ..arrays.state import SurfaceInteraction
 from ..arrays.vec import Floats, f4, luminance
 from ..colors import rgb
-from ..core.errors import SceneError, number, one_of
+from ..core.errors import SceneError, exact, number, one_of
 from .base import BaseTexture
 
 # Largest index of refraction; the least is its inverse: fourth powers stay in the range of float32.
@@ -105,7 +105,7 @@ def check_limits(name: str, value: BaseTexture, holds: Callable[[float], bool], 
             hint = ""
             if 1 < extreme <= 255:
                 hint = ". Values from 0 to 255 are passed as uint8, or divided by 255; scale= multiplies them"
-            raise SceneError(f"{name}: {value!r} has the value {extreme:g}; it must be {limit}{hint}")
+            raise SceneError(f"{name}: {value!r} has the value {exact(extreme)}; it must be {limit}{hint}")
 
 
 def color(name: str, value: Color, high: float = 1.0, *, above_zero: bool = False) -> Any:

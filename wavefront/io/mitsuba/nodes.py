@@ -9,7 +9,7 @@ from typing import Any, TypeVar
 import numpy as np
 
 from ...arrays.vec import Doubles
-from ...core.errors import SceneError, finite_array, in_brief, one_of
+from ...core.errors import LimitError, SceneError, finite_array, in_brief, one_of
 from ...core.suggestions import did_you_mean
 from ...shapes.transform import Matrix
 from ..conversion import Conversion, Part
@@ -221,7 +221,7 @@ class Graph:
                 value = child
             node.values[name] = value
         if node.size > MOST_PARTS and kind != "scene":
-            raise SceneError(
+            raise LimitError(
                 f"{label}: stands for {node.size} plugins, as they refer to each other; "
                 f"the limit is {MOST_PARTS}"
             )

@@ -8,7 +8,7 @@ import numpy as np
 
 from ...camera import Camera
 from ...camera.projection import Orthographic, Panorama, Perspective, Projection
-from ...core.errors import SceneError
+from ...core.errors import SceneError, exact
 from ...sampling.filters import BoxFilter, GaussianFilter, TentFilter
 from ...shapes.transform import Matrix
 from ..mitsuba.views import angle_of, half_tangent
@@ -97,7 +97,7 @@ def exposure_of(film: Entity | None, camera: Entity | None) -> float:
     if camera is not None:
         time = camera.number("shutterclose", 1.0) - camera.number("shutteropen", 0.0)
         if not time > 0:
-            raise SceneError(f"{camera.label}: is open for {time:g}; it must be above 0")
+            raise SceneError(f"{camera.label}: is open for {exact(time)}; it must be above 0")
     return time * (1.0 if film is None else film.number("iso", 100.0, lambda x: x > 0, "above 0") / 100)
 
 

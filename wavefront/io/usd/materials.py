@@ -13,7 +13,7 @@ import numpy as np
 from ...arrays.elementary import sin_cos_turns
 from ...bsdfs import Diffuse, Principled
 from ...codecs.images import decode_codes
-from ...core.errors import SceneError
+from ...core.errors import LimitError, SceneError
 from ...materials import Material
 from ...textures import NormalMap, Texture, VertexColors
 from ...textures.base import BaseTexture
@@ -96,7 +96,7 @@ class Materials:
             if not asset:
                 return None
             if asset.GetSize() > self.files.limits.file_bytes:
-                raise SceneError(f"{name}: has {asset.GetSize()} bytes; the limit is LoadLimits.file_bytes")
+                raise LimitError(f"{name}: has {asset.GetSize()} bytes; the limit is LoadLimits.file_bytes")
             return decode_codes(bytes(asset.GetBuffer()), name[:-1], self.files.budget)
         folder = Path(self.files.name).resolve().parent
         path = self.files.find(os.path.relpath(name, folder) if os.path.isabs(name) else name)

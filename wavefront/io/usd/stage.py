@@ -12,7 +12,7 @@ import numpy as np
 from ...bsdfs import Diffuse
 from ...camera import Camera
 from ...camera.projection import Orthographic, Perspective, Projection
-from ...core.errors import SceneError, number
+from ...core.errors import LimitError, SceneError, number
 from ...lights import Light
 from ...materials import Material
 from ...shapes import Shape, Sphere
@@ -112,7 +112,7 @@ class _Reader:
             where = str(prim.GetPath())
             self.placements += len(matrices)
             if self.placements > self.files.limits.instances:
-                raise SceneError(f"{where}: is beyond the limit LoadLimits.instances")
+                raise LimitError(f"{where}: is beyond the limit LoadLimits.instances")
             with np.errstate(all="ignore"), placed(where, where):  # what is not finite is refused
                 self._read(prim, kind, below @ matrix)
 
@@ -129,7 +129,7 @@ class _Reader:
             prim, above, resets = waiting.pop()
             count += 1
             if count > MOST_PRIMS:
-                raise SceneError(f"{prim.GetPath()}: is beyond the limit of {MOST_PRIMS} prims")
+                raise LimitError(f"{prim.GetPath()}: is beyond the limit of {MOST_PRIMS} prims")
             if self._value(prim, "visibility") == "invisible":
                 continue
             if self._value(prim, "purpose") in ("proxy", "guide"):
