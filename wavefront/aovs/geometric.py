@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..arrays.state import Hits, Rays, Words
-from ..arrays.vec import Doubles, Ints, distinct, dot, f4, length
+from ..arrays.vec import Bools, Doubles, Ints, distinct, dot, f4, length
 from ..camera import Camera
 from ..compile.materials import material_parts
 from ..compile.scene import CompiledScene
@@ -205,12 +205,25 @@ class _Corners:
     def _uv(self, mesh: Shape, shape: Ints, face: Ints, point: Doubles) -> Doubles:
         if not isinstance(mesh, Mesh) or mesh.uvs is None:
             return np.full((len(point), 2), np.nan)
-        corners = mesh.faces.take(face, 0)
-        a, b, c = mesh.vertices.take(corners, 0).transpose(1, 2, 0)
-        a, b, c = (self._placed(shape, corner) for corner in (a, b, c))
-        b1, b2 = _weights(a, b, c, point.T)
-        at_a, at_b, at_c = mesh.uvs.take(corners, 0).transpose(1, 2, 0)
+        (b1, b2), beyond = self._on_faces(mesh, shape, face, point)
+        following = np.minimum(face + 1, len(mesh.faces) - 1)
+        other, further = self._on_faces(mesh, shape, following, point)
+        # of a flat quadrilateral whose halves look alike, the first half may have been reported
+        second = _are_quads(mesh, face, following) & (further < beyond)
+        face, b1, b2 = (
+            np.where(second, then, now) for then, now in ((following, face), (other[0], b1), (other[1], b2))
+        )
+        at_a, at_b, at_c = mesh.uvs.take(mesh.faces.take(face, 0), 0).transpose(1, 2, 0)
         return (at_a + (at_b - at_a) * b1 + (at_c - at_a) * b2).T
+
+    def _on_faces(
+        self, mesh: Mesh, shape: Ints, face: Ints, point: Doubles
+    ) -> tuple[tuple[Doubles, Doubles], Doubles]:
+        """Return the barycentric weights (n,) of points (n, 3) on faces, and how far they are outside."""
+        corners = mesh.vertices.take(mesh.faces.take(face, 0), 0).transpose(1, 2, 0)
+        a, b, c = (self._placed(shape, corner) for corner in corners)
+        b1, b2 = _weights(a, b, c, point.T)
+        return (b1, b2), np.maximum(np.maximum(-b1, -b2), b1 + b2 - 1)
 
     def _placed(self, number: Ints, vertex: Doubles) -> Doubles:
         """Return vertices (3, n) of the meshes of shapes (n,) in the scene."""
@@ -223,6 +236,12 @@ class _Corners:
         m = m.take(lane, 0).transpose(1, 2, 0)
         x, y, z = vertex
         return np.stack([row[0] * x + row[1] * y + row[2] * z + row[3] for row in m[:3]])
+
+
+def _are_quads(mesh: Mesh, face: Ints, following: Ints) -> Bools:
+    """Return whether faces (n,) are fans with those that follow: see `shapes/fans.py`."""
+    (a, _, c), (p, q, _) = (mesh.vertices.take(mesh.faces.take(each, 0).T, 0) for each in (face, following))
+    return ((a == p) & (c == q)).all(1)
 
 
 def _weights(a: Doubles, b: Doubles, c: Doubles, point: Doubles) -> tuple[Doubles, Doubles]:

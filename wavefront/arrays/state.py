@@ -124,8 +124,9 @@ class Paths(Rays):
     prev_vertex: Floats | None = None  # (3, n) where the paths last scattered; None where that is `origin`
     # what lights were sampled for there (lights/base.py); None where no light of the scene takes it
     left_receiver: Any = None
-    # (n,) the path has left its first surface by a lobe that is not a delta lobe; None without light tracing
-    left_rough: Bools | None = None
+    # (n,) paths from lights reach the first surface of the path, as no shadow catcher was passed before,
+    # and it was left by a lobe that is not a delta lobe; None without light tracing
+    light_traced: Bools | None = None
     # BSDF of the sensors at which the paths start (stages/sensors.py); None elsewhere
     sensor: Any = None
     # for layers (aovs/recorder.py); None unless they are asked for

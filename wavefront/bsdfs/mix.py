@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from copy import copy
-from typing import Self
+from typing import Any, Self
 
 import numpy as np
 
 from ..arrays.state import SurfaceInteraction
 from ..arrays.vec import BELOW_ONE, Bools, Floats, f4
 from ..core.parameter import Parameter, parametrized
+from ..textures.base import BaseTexture
 from ..textures.parameter import Scalar, scalar
 from .base import Bsdf, BsdfSample, JointBsdf, is_bsdf, weigh
 
@@ -51,6 +52,16 @@ class Mix(JointBsdf):
     def encloses(self) -> bool:
         """True if one of both does."""
         return self.first.encloses or self.second.encloses
+
+    @property
+    def index_inside(self) -> Any:
+        """The index of refraction of both BSDFs, one after the other if they differ."""
+        found = [each.index_inside for each in (self.first, self.second) if each.encloses]
+        known = [index for index in found if index is not None]
+        varying = [index for index in known if isinstance(index, BaseTexture)]
+        if varying or len(known) < 2:
+            return (varying + known)[0] if known else None
+        return known[0] if np.array_equal(*known) else np.concatenate([np.ravel(index) for index in known])
 
     def bind(self, surface: SurfaceInteraction) -> Self:
         """Look up the weight, and the parameters of both BSDFs."""

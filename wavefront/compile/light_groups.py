@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from dataclasses import replace
 
 import numpy as np
 
@@ -32,7 +33,7 @@ class LightGroups:
     def with_media(self) -> LightGroups:
         """Return the groups with light of media, number -1, in the default one."""
         names = self.names if DEFAULT_GROUP in self.names else (*self.names, DEFAULT_GROUP)
-        return LightGroups(names, np.append(self.of_light, names.index(DEFAULT_GROUP)), self.environment)
+        return replace(self, names=names, of_light=np.append(self.of_light, names.index(DEFAULT_GROUP)))
 
     def parts_of_environment(self, wi: Floats) -> Iterator[tuple[str, Floats]]:
         """Yield each group of the environment, and its part (3, n) of the radiance from wi (3, n)."""

@@ -18,6 +18,7 @@ from ..arrays.vec import Doubles
 from ..core.errors import SceneError
 from ..lights import Light
 from ..materials import Material
+from ..media import BaseMedium
 from ..shapes import CurvedShape, Instance, Mesh, Shape
 
 # Radii of scenes that are not scaled. The upper limit is nearer: no part of a scene is larger than it.
@@ -36,17 +37,20 @@ def scaled_shapes(shapes: Sequence[Shape], factor: float) -> list[Shape]:
     """Return shapes, and their materials, with all lengths multiplied by `factor`.
 
     Instanced meshes are traced in their own coordinates, so each has its own factor, which the transforms
-    cancel. Shared meshes and materials stay shared.
+    cancel. Shared meshes, materials and media stay shared.
     """
     placed = {id(shape.mesh): shape.mesh for shape in shapes if isinstance(shape, Instance)}
     own = {key: length_factor(_radius(mesh)) for key, mesh in placed.items()}
     if factor == 1 and all(each == 1 for each in own.values()):
         return list(shapes)
     materials: dict[int, Material] = {}
+    media: dict[int, BaseMedium] = {}
 
     def material(given: Material) -> Material:
         if id(given) not in materials:
-            materials[id(given)] = given.scaled(factor)
+            materials[id(given)] = scaled = given.scaled(factor)
+            if scaled.interior is not given.interior and scaled.interior is not None:
+                scaled.interior = media.setdefault(id(given.interior), scaled.interior)
         return materials[id(given)]
 
     meshes = {

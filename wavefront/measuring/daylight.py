@@ -181,7 +181,7 @@ def daylight_coefficients(
     Parameters
     ----------
     scene
-        As for `render`. Its lights do not count; shapes that emit are refused.
+        As for `render`. Its lights do not count; shapes and media that emit are refused.
     points, normals
         As for `measure`.
     subdivision
@@ -226,7 +226,9 @@ def daylight_coefficients(
     )
     subject.lights = []
     if subject.emits:
-        raise SceneError("a shape of the scene emits; daylight coefficients are those of the sky alone")
+        raise SceneError(
+            "a shape of the scene emits, or a medium; daylight coefficients are those of the sky alone"
+        )
     subject.lights = [PatchedEnvironment(np.ones((3, 1), f4), patches=patches)]
     sensors = Sensors(points, normals)
     places = sensors.above(subject.bounds)

@@ -219,8 +219,10 @@ class Scene(Answers):
 
     @property
     def emits(self) -> bool:
-        """True if the scene has any light."""
-        return bool(self.lights) or any(shape.emission is not None for shape in self.shapes)
+        """True if the scene has any light, also of a medium that glows."""
+        media = [self.medium, *(shape.material.interior for shape in self.shapes)]
+        shines = any(shape.emission is not None for shape in self.shapes)
+        return bool(self.lights) or shines or any(each.glows for each in media if each is not None)
 
     @suggests_keywords
     def framing_camera(

@@ -9,6 +9,7 @@ surface behind, so both loops end.
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 
@@ -17,6 +18,7 @@ from ..arrays.vec import ALL, Bools, Floats, Ints, f4, take
 from ..compile.scene import CompiledScene
 from ..core.errors import RenderError
 from ..sampling.sampler import Dimension, Sampler, numbers_of
+from .inside import stacks_at
 from .interaction import interaction
 from .intersect import intersect
 from .medium import absorb, cross, fly
@@ -57,9 +59,13 @@ def alpha_pass_through(
         here, at = paths.take(lanes), hits.take(lanes)
         surface = interaction(scene, here, at)
         opacity = _opacities(scene, here, at, surface, sampler, catches, absent)
-        if opacity.any():
+        traced = paths.light_traced if catches else None
+        if opacity.any() or traced is not None:
             u = sampler.draw_1d(here.pixel, here.sample, bounce, dimension)
             passing = np.flatnonzero(u >= opacity)
+            if traced is not None:  # paths from lights do not know how well lit a catcher is: it stops them
+                lit = u < opacities_at(scene, surface, here.media, absent)
+                traced[lanes.take(passing.compress(lit.take(passing)))] = False
             lanes, here, at = lanes.take(passing), here.take(passing), at.take(passing)
             surface = surface.take(passing)
         absorb(scene, here.throughput, at, surface)
@@ -75,8 +81,13 @@ def alpha_pass_through(
 
 def _own_columns(scene: CompiledScene, paths: Paths) -> Paths:
     """Return paths with copies of what changes on their way to the next surface."""
+    traced = paths.light_traced
     own = replace(
-        paths, origin=paths.origin.copy(), exclude_prim=paths.exclude_prim.copy(), prev_vertex=paths.origin
+        paths,
+        origin=paths.origin.copy(),
+        exclude_prim=paths.exclude_prim.copy(),
+        prev_vertex=paths.origin,
+        light_traced=None if traced is None else np.array(traced),
     )
     if scene.media is None:
         return own
@@ -119,18 +130,30 @@ def covering_hits(scene: CompiledScene, rays: Rays) -> tuple[Rays, Hits]:
     """Return the nearest hits of camera rays on surfaces whose opacity is at least `COVERING`.
 
     Nothing is random here. The rays that are returned start behind the last surface that they have passed.
+    Surfaces within something of a higher priority are not there.
     """
-    hits = intersect(scene, rays)
-    lanes = np.flatnonzero(passable(scene, hits, ALL, None, scene.unseen))
+    hits, stack = intersect(scene, rays), _nested_stacks(scene, rays)
+    lanes = np.flatnonzero(passable(scene, hits, ALL, stack, scene.unseen))
     if not lanes.size:
         return rays, hits
     rays = replace(rays, origin=rays.origin.copy(), exclude_prim=rays.exclude_prim.copy())
     while lanes.size:
         here, at = rays.take(lanes), hits.take(lanes)
-        surface = interaction(scene, here, at)
-        passing = np.flatnonzero(opacities_at(scene, surface, None, scene.unseen) < COVERING)
-        lanes, here = lanes.take(passing), continue_behind(here.take(passing), surface.take(passing))
+        surface, around = interaction(scene, here, at), None if stack is None else take(stack, lanes)
+        passing = np.flatnonzero(opacities_at(scene, surface, around, scene.unseen) < COVERING)
+        lanes, surface = lanes.take(passing), surface.take(passing)
+        here = continue_behind(here.take(passing), surface)
         rays.put(lanes, here)
         hits.put(lanes, intersect(scene, here))
-        lanes = lanes.compress(passable(scene, hits, lanes, None, scene.unseen))
+        if stack is not None:
+            stack[:, lanes] = cross(scene, take(stack, lanes), surface)
+        lanes = lanes.compress(
+            passable(scene, hits, lanes, None if stack is None else take(stack, lanes), scene.unseen)
+        )
     return rays, hits
+
+
+def _nested_stacks(scene: CompiledScene, rays: Rays) -> Any:
+    """Return what rays begin inside of, (4, n), where that hides surfaces; None where none is hidden."""
+    nested = scene.media is not None and scene.media.nested.any()
+    return stacks_at(scene, rays.origin) if nested else None

@@ -92,7 +92,9 @@ def bounce_sample(paths: Paths, shade: Shading, sampler: Sampler, bounce: int) -
         specular=specular,
         roulette_scale=roulette_scale,
         media=shade.stacks(paths.media, cos_g),
-        left_rough=~specular if bounce == 0 and paths.left_rough is not None else paths.left_rough,
+        light_traced=paths.light_traced
+        if bounce or paths.light_traced is None
+        else paths.light_traced & ~specular,
         depth=None if paths.depth is None else _after(paths.depth, specular),
         met_rough=paths.met_rough,
         left_receiver=shade.receiver,

@@ -45,7 +45,7 @@ def generate(
         specular=broadcast(np.True_, n),
         roulette_scale=broadcast(f4(1) if sensor is None else f4(1) / sensor.total, n),
         media=stacks_at(scene, origin),
-        left_rough=None if scene.specular_surfaces is None else broadcast(np.False_, n),
+        light_traced=None if scene.specular_surfaces is None else broadcast(np.True_, n),
         sensor=sensor,
     )
 

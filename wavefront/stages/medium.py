@@ -69,6 +69,8 @@ def fly(
         met = np.flatnonzero(flight.t < length)
         hits.t[at.take(met)] = flight.t.take(met)
         hits.prim[at.take(met)] = media.event_of.take(medium.take(rows.take(met)))
+        if hits.instance is not None:
+            hits.instance[at.take(met)] = 0  # it is no part of the instance behind it
         reached[inside.take(rows.take(met))] = False
     return lanes.compress(reached)
 

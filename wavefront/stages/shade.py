@@ -183,10 +183,10 @@ def without_caustics(
     hits, emission
         What they hit, and the emission that they met there.
     """
-    if scene.specular_surfaces is None or paths.left_rough is None:
+    if scene.specular_surfaces is None or paths.light_traced is None:
         return emission
     lanes = emission.lanes
-    found = take(paths.left_rough, lanes) & take(paths.specular, lanes)
+    found = take(paths.light_traced, lanes) & take(paths.specular, lanes)
     found &= scene.specular_surfaces.includes(take(left, lanes)) & (hits.prim.take(lanes) >= 0)
     found &= scene.lights.chosen_from.take(emission.light)
     if not found.any():
