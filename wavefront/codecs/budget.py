@@ -51,6 +51,11 @@ class Budget:
         """Allow for the memory of a file of `size` bytes."""
         self._most += PER_BYTE * size
 
+    @property
+    def most(self) -> int:
+        """The bytes of memory that may be taken in all."""
+        return self._most
+
     def check_size(self, height: int, width: int) -> None:
         """Refuse an image that is empty or has too many pixels, with a SceneError."""
         check_size(height, width, self.pixels)

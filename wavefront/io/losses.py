@@ -9,7 +9,7 @@ passed, or where an argument of a call is wrong.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from contextlib import ExitStack, contextmanager
 from typing import Self
 
@@ -88,6 +88,10 @@ class Losses:
         if (limited != given).any():
             self.note(part, place, _text(given), f"clamped to {_text(limited)}")
         return limited
+
+    def take(self, losses: Iterable[Loss]) -> None:
+        """Note what another list of the same file has."""
+        self._noted.update(dict.fromkeys(losses))
 
     @property
     def found(self) -> tuple[Loss, ...]:

@@ -54,6 +54,8 @@ class LoadLimits:
     memory_bytes
         Memory for all arrays and images, in bytes; 128 bytes for each byte of the files are added. It is
         compared with what headers claim, before any is allocated.
+    seconds
+        How long a file of USD may take to read, by a process that is ended then.
 
     Raises
     ------
@@ -79,6 +81,7 @@ class LoadLimits:
     includes: int = 1024
     unpacked_bytes: int = 2**30
     memory_bytes: int = MEMORY_BYTES
+    seconds: int = 600
 
     def __post_init__(self) -> None:
         for each in fields(self):

@@ -82,13 +82,18 @@ class Materials:
         if not hasattr(file, "resolvedPath"):  # a value of another type than the schema has
             raise SceneError(f"{prim.GetPath()}: file is {str(file)[:60]!r}; it must be an asset path")
         name = file.resolvedPath or file.path
+        try:
+            path = self._allowed(name.partition("[")[0])
+        except SceneError as error:
+            self.lose(prim, f"the image {file.path!r}: {str(error).removeprefix(f'{self.files.name}: ')}")
+            return None
         if name not in self._images:
-            self._images[name] = self._read(name)
+            self._images[name] = self._read(name, path)
         if self._images[name] is None:
             self.lose(prim, f"the image {file.path!r}, which is missing")
         return self._images[name]
 
-    def _read(self, name: str) -> Any:
+    def _read(self, name: str, path: Path) -> Any:
         if name.endswith("]"):  # in a usdz archive
             from pxr import Ar
 
@@ -98,9 +103,12 @@ class Materials:
             if asset.GetSize() > self.files.limits.file_bytes:
                 raise LimitError(f"{name}: has {asset.GetSize()} bytes; the limit is LoadLimits.file_bytes")
             return decode_codes(bytes(asset.GetBuffer()), name[:-1], self.files.budget)
-        folder = Path(self.files.name).resolve().parent
-        path = self.files.find(os.path.relpath(name, folder) if os.path.isabs(name) else name)
         return self.files.image(path) if path.exists() else None
+
+    def _allowed(self, name: str) -> Path:
+        """Return the path of a file that may be read."""
+        folder = Path(self.files.name).resolve().parent
+        return self.files.find(os.path.relpath(name, folder) if os.path.isabs(name) else name)
 
 
 class _Surface:

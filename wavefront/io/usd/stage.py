@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import math
 import os
+from collections.abc import Iterator
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -12,60 +14,89 @@ import numpy as np
 from ...bsdfs import Diffuse
 from ...camera import Camera
 from ...camera.projection import Orthographic, Perspective, Projection
-from ...core.errors import LimitError, SceneError, number
+from ...core.errors import LimitError, SceneError, hear_warnings, number, passed_limit
 from ...lights import Light
 from ...materials import Material
+from ...scene.loss import Loss
 from ...shapes import Shape, Sphere
 from ...shapes.transform import Matrix
 from ..contents import Contents
 from ..conversion import placed
 from ..placing import Places
 from ..repair import RawMesh
-from ..sources import SceneFiles
+from ..sources import LoadLimits, SceneFiles
+from ..xml_checks import MAX_DEPTH
+from .child import CHILD, limited_memory
 from .gprims import GPRIMS
+from .layers import MOST_PRIMS, Layers, said
 from .lights import LAMPS, Lamp
 from .materials import Materials
 from .meshes import Meshes
 from .values import is_even, mean_scale, value_of
 
 HEIGHT = 512  # pixels of the picture of a camera
-MOST_PRIMS = 2**20
 HARMLESS = ("Scope", "Xform", "Material", "Shader", "NodeGraph", "GeomSubset", "RenderSettings", "")
 
 
 def read_usd(files: SceneFiles, time: float | None = None) -> Contents:
     """Return the contents of a file of USD (.usd, .usda, .usdc, .usdz) at a time code, by default the first.
 
+    It is read by a process of its own.
+
     Raises
     ------
     SceneError
-        If usd-core is not installed, the file is malformed, or it refers to files elsewhere.
+        If usd-core is not installed, the file is malformed, or beyond a limit.
     """
     name = files.name
     try:
-        from pxr import Sdf, Usd
+        import pxr  # noqa: F401
     except ImportError as error:
         raise SceneError(f"{name}: files of USD need usd-core: pip install usd-core") from error
+    arguments = name, files.search_paths, files.limits, time
+    found: _Found = CHILD.call(name, files.limits.seconds, _in_child, *arguments)
+    files.losses.take(found.losses)
+    if found.error is not None:
+        raise found.error
+    assert found.contents is not None
+    return found.contents
+
+
+@dataclass
+class _Found:
+    contents: Contents | None
+    error: SceneError | None  # in their place
+    losses: tuple[Loss, ...]
+
+
+def _in_child(name: str, search_paths: tuple[Path, ...], limits: LoadLimits, time: float | None) -> _Found:
+    """Return what a file holds, within the limits of its load."""
+    from pxr import Pcp, Usd, UsdGeom, UsdLux, UsdShade, UsdUtils  # noqa: F401 (they are not in the limit)
+
+    files = SceneFiles(name, search_paths, limits)
+    files.budget.add_file(os.path.getsize(name))
+    contents, error = None, None
+    with hear_warnings(files.losses.hear), limited_memory(files.budget):
+        try:
+            contents = _read(files, time)
+        except SceneError as wrong:
+            message = str(wrong) if str(wrong).startswith(name) else f"{name}: {wrong}"
+            error = (LimitError if passed_limit(wrong) else SceneError)(message)
+    return _Found(contents, error, files.losses.found)
+
+
+def _read(files: SceneFiles, time: float | None) -> Contents:
+    from pxr import Usd
+
     try:
-        known = Sdf.Layer.Find(os.path.abspath(name))
-        stage = Usd.Stage.Open(os.path.abspath(name))
-        for layer in stage.GetUsedLayers() if known else ():  # its files may have changed since
-            layer.Reload(force=True)
-        _check_layers(files, stage)
+        layers = Layers(files)
+        layers.check_size()
+        stage = Usd.Stage.Open(layers.open[layers.root])
         return _Reader(files, stage, time).contents()
-    except SceneError as error:
-        raise error if str(error).startswith(name) else SceneError(f"{name}: {error}") from error
+    except SceneError:
+        raise
     except (RuntimeError, TypeError, ValueError, IndexError) as error:  # also those of pxr.Tf
-        raise SceneError(f"{name}: cannot be read: {' '.join(str(error).split())[:300]}") from error
-
-
-def _check_layers(files: SceneFiles, stage: Any) -> None:
-    """Check that all layers are in the folders that the scene may read."""
-    roots = [Path(files.name).resolve().parent, *(each.resolve() for each in files.search_paths)]
-    for layer in stage.GetUsedLayers():
-        path = layer.realPath.partition("[")[0]
-        if path and not any(Path(path).resolve().is_relative_to(root) for root in roots):
-            raise SceneError(f"refers to {path}, which is outside its folder and the search paths")
+        raise SceneError(f"{files.name}: cannot be read: {said(error)}") from error
 
 
 class _Reader:
@@ -80,7 +111,9 @@ class _Reader:
         self.raws: list[RawMesh] = []
         self.of_prim: dict[Any, list[int]] = {}
         self.placed: list[tuple[int, Matrix]] = []  # of a mesh, and its places (n, 4, 4)
-        self.placements = 0
+        self._instancers: dict[str, list[tuple[Any, Matrix]]] = {}
+        self._found: dict[str, list[tuple[Any, str, Matrix, bool]]] = {}
+        self._sizes: dict[str, int] = {}
         self.shapes: list[Shape] = []
         self.lights: list[Light] = []
         self.camera: Camera | None = None
@@ -96,8 +129,9 @@ class _Reader:
         unit = float(UsdGeom.GetStageMetersPerUnit(self.stage))
         self.unit = number("metersPerUnit", unit, lambda x: x > 0, "above 0")
         for error in self.stage.GetCompositionErrors():
-            self.files.losses.note(" ".join(str(error).split())[:200], "composition")
+            self.files.losses.note(said(error), "composition")
         self.root = np.diag([self.unit] * 3 + [1.0])  # from the stage to the scene
+        self._count(self.stage.GetPseudoRoot(), ())
         self._place(self.stage.GetPseudoRoot(), self.root[None])
         counts = [len(matrices) for _, matrices in self.placed]
         numbers = np.repeat(np.array([index for index, _ in self.placed], np.intp), counts)
@@ -105,18 +139,47 @@ class _Reader:
         up = str(UsdGeom.GetStageUpAxis(self.stage)).lower()
         return Contents(self.raws, places, self.lights, self.camera, self.shapes, up=up)
 
+    def _count(self, top: Any, above: tuple[str, ...]) -> int:
+        """Return how much is placed with a prim, before any is: instancers may place instancers.
+
+        Raises
+        ------
+        SceneError
+            If it is too much, or places itself.
+        """
+        key = str(top.GetPath())
+        if key in above:
+            raise SceneError(f"{key}: places itself")
+        if len(above) > MAX_DEPTH:
+            raise SceneError(f"{key}: is placed by instancers that are nested deeper than {MAX_DEPTH}")
+        if key not in self._sizes:
+            count = 0
+            for prim, kind, *_ in self._leaves(top):
+                count += 1
+                if kind == "PointInstancer":
+                    parts = self._prototypes(prim)
+                    count += sum(len(places) * self._count(each, (*above, key)) for each, places in parts)
+                if count > self.files.limits.instances:
+                    raise LimitError(f"{prim.GetPath()}: is beyond the limit LoadLimits.instances")
+            self._sizes[key] = count
+        return self._sizes[key]
+
     def _place(self, top: Any, matrices: Matrix) -> None:
         """Read a prim that stands at several places (n, 4, 4), and all below it."""
         for prim, kind, matrix, resets in self._leaves(top):
             below = np.tile(self.root, (len(matrices), 1, 1)) if resets else matrices
             where = str(prim.GetPath())
-            self.placements += len(matrices)
-            if self.placements > self.files.limits.instances:
-                raise LimitError(f"{where}: is beyond the limit LoadLimits.instances")
             with np.errstate(all="ignore"), placed(where, where):  # what is not finite is refused
                 self._read(prim, kind, below @ matrix)
 
     def _leaves(self, top: Any) -> list[tuple[Any, str, Matrix, bool]]:
+        """Return what is to be read of a prim and all below it, found once."""
+        key = str(top.GetPath())
+        if key not in self._found:
+            self._found[key] = self._find_leaves(top)
+        return self._found[key]
+
+    def _find_leaves(self, top: Any) -> list[tuple[Any, str, Matrix, bool]]:
         """Return what is to be read of a prim and all below it.
 
         Each has its type, the matrix to the space around the prim, and whether it is that to the stage.
@@ -181,6 +244,17 @@ class _Reader:
         return value_of(prim, self.time, name, default)
 
     def _instancer(self, prim: Any, matrix: Matrix) -> None:
+        for target, found in self._prototypes(prim):
+            self._place(target, matrix @ found)
+
+    def _prototypes(self, prim: Any) -> list[tuple[Any, Matrix]]:
+        """Return what an instancer places, and where: (n, 4, 4), relative to it."""
+        key = str(prim.GetPath())
+        if key not in self._instancers:
+            self._instancers[key] = list(self._read_prototypes(prim))
+        return self._instancers[key]
+
+    def _read_prototypes(self, prim: Any) -> Iterator[tuple[Any, Matrix]]:
         from pxr import UsdGeom
 
         instancer = UsdGeom.PointInstancer(prim)
@@ -198,12 +272,12 @@ class _Reader:
             raise SceneError(f"{prim.GetPath()}: protoIndices has {bad[0]}; there are {len(prototypes)}")
         if len(which) != len(found):
             raise SceneError(f"{prim.GetPath()}: has {len(which)} protoIndices and {len(found)} positions")
-        matrices = matrix @ np.array(found, float).reshape(-1, 4, 4).transpose(0, 2, 1)
+        matrices = np.array(found, float).reshape(-1, 4, 4).transpose(0, 2, 1)
         for index in np.unique(which).tolist():
             target = self.stage.GetPrimAtPath(prototypes[index])
             if not target or prim.GetPath().HasPrefix(target.GetPath()):
                 raise SceneError(f"{prim.GetPath()}: its prototype {prototypes[index]} cannot be placed")
-            self._place(target, matrices[which == index])
+            yield target, matrices[which == index]
 
     def _meshes(self, prim: Any) -> list[int]:
         """Return the numbers of the meshes of a prim, one for each material; instances share them.

@@ -1,0 +1,188 @@
+"""The layers of a stage: each is checked before it is opened, and so is how many prims they stand for."""
+
+from __future__ import annotations
+
+import os
+import re
+from pathlib import Path
+from typing import Any
+
+from ...codecs.budget import PER_BYTE
+from ...core.errors import LimitError, SceneError
+from ..sources import SceneFiles
+from .child import allow_memory
+
+MOST_PRIMS = 2**20
+PRIMS = 2**16  # that files of any size may stand for; each of their bytes adds one
+MOST_SAID = 300  # letters of a message of usd-core
+WHERE = re.compile(r"^Error in '.*?' at line \d+ in file \S+ : ")  # in the source of usd-core
+EXTENSIONS = (".usd", ".usda", ".usdc", ".usdz")
+VARIABLE = re.compile(r"\$\{\w+\}")
+
+
+class Layers:
+    """All layers that the stage of a file may open, which are open from now on.
+
+    What refers to a file that may not be read, or is missing, is taken out of the layer in memory.
+
+    Parameters
+    ----------
+    files
+        The files that the stage may read.
+    """
+
+    def __init__(self, files: SceneFiles) -> None:
+        self._files = files
+        self.root = os.path.abspath(files.name)
+        self.open: dict[str, Any] = {}  # by their identifiers
+        self._counted = {Path(self.root): os.path.getsize(self.root)}
+        self._waiting = [self.root]
+        self._variables: dict[str, Any] = {}
+        while self._waiting:
+            name = self._waiting.pop()
+            if name not in self.open:
+                self.open[name] = layer = self._opened(name)
+                if layer is not None:
+                    self._check(layer)
+
+    def _opened(self, name: str) -> Any:
+        """Return a layer, None if it is damaged and not the first one."""
+        from pxr import Sdf
+
+        known = Sdf.Layer.Find(name)
+        if known:
+            known.Reload(force=True)  # the file may have changed since
+        try:
+            return Sdf.Layer.FindOrOpen(name)
+        except RuntimeError:
+            if name == self.root:
+                raise
+            return None  # the stage says why
+
+    def _check(self, layer: Any) -> None:
+        """Take out of a layer what refers to files that may not be read, and have all others opened."""
+        from pxr import UsdUtils
+
+        self._variables = {**layer.expressionVariables, **self._variables}
+        composed = set(layer.GetCompositionAssetDependencies())
+        layer.SetPermissionToEdit(True)
+        wrong: list[SceneError] = []
+
+        def checked(path: str) -> str:
+            name = self._evaluated(path)
+            if not (path in composed or name != path or "[" in name or name.lower().endswith(EXTENSIONS)):
+                return path  # an image, which is opened by way of `SceneFiles.find`
+            try:
+                return self._packed(layer, name) or self._beside(layer, name)
+            except SceneError as error:
+                wrong.append(error)
+                return ""
+
+        UsdUtils.ModifyAssetPaths(layer, checked)
+        for error in wrong:  # they would not come through usd-core
+            with self._files.losses.part():
+                raise error
+
+    def _evaluated(self, path: str) -> str:
+        """Return the path that an expression with variables stands for."""
+        from pxr import Sdf
+
+        if not VARIABLE.search(path):
+            return path
+        result = Sdf.VariableExpression(f'`"{path}"`').Evaluate(self._variables)
+        return path if result.errors else str(result.value)
+
+    def _packed(self, layer: Any, path: str) -> str:
+        """Return the path of what is in the same archive as the layer that refers to it, "" if it is not."""
+        from pxr import Ar, Sdf
+
+        anchored = Sdf.ComputeAssetPathRelativeToLayer(layer, path)
+        archive, inner = Ar.SplitPackageRelativePathOuter(anchored)
+        if not inner or os.path.realpath(archive) != os.path.realpath(_file_of(layer)):
+            return ""
+        self._await(anchored)
+        return path
+
+    def _beside(self, layer: Any, path: str) -> str:
+        """Return the path of a file that may be read, or raise a SceneError."""
+        from pxr import Ar, Sdf
+
+        own = _file_of(layer)
+        name, arguments = Sdf.Layer.SplitIdentifier(path)
+        outer, inner = Ar.SplitPackageRelativePathOuter(name)
+        outer = os.path.relpath(outer, os.path.dirname(own)) if os.path.isabs(outer) else outer
+        if "#" in os.path.basename(outer):  # clips by their numbers
+            for each in _numbered(own, outer):
+                self._await(str(self._files.find(each, own)))
+            return path
+        found = self._files.find(outer, own)
+        if not found.exists():
+            raise SceneError(f"{own}: refers to {path!r}, which is missing")
+        self._count(found)
+        target = f"{found}[{inner}]" if inner else str(found)
+        self._await(target)
+        return Sdf.Layer.CreateIdentifier(target, arguments) if arguments else target
+
+    def _count(self, file: Path) -> None:
+        """Allow for the memory of a file."""
+        if file not in self._counted:
+            size = file.stat().st_size
+            self._counted[file] = size
+            self._files.budget.add_file(size)
+            allow_memory(PER_BYTE * size)
+
+    def _await(self, name: str) -> None:
+        """Have a layer opened; others than layers are not."""
+        if name.rstrip("]").lower().endswith(EXTENSIONS):
+            self._waiting.append(name)
+
+    def check_size(self) -> None:
+        """Count the prims that the layers stand for, as the stage would take memory for each of them.
+
+        Raises
+        ------
+        SceneError
+            If there are too many.
+        """
+        from pxr import Pcp
+
+        most = min(MOST_PRIMS, PRIMS + sum(self._counted.values()))
+        layer = self.open[self.root]
+        cache = Pcp.Cache(Pcp.LayerStackIdentifier(layer), "usd", True)
+        root, _ = cache.ComputePrimIndex(layer.pseudoRoot.path)
+        waiting, count = [(layer.pseudoRoot.path, root)], 0
+        while waiting:
+            above, index = waiting.pop()
+            for name in index.ComputePrimChildNames()[0]:
+                path = above.AppendChild(name)
+                child, _ = cache.ComputePrimIndex(path)
+                if child.hasAnyPayloads and not cache.IsPayloadIncluded(path):
+                    cache.RequestPayloads([path], [])
+                    child, _ = cache.ComputePrimIndex(path)
+                waiting.append((path, child))
+                count += 1
+                if count > most:
+                    raise LimitError(f"{path}: is beyond the limit of {most} prims for files of this size")
+
+
+def said(error: Any) -> str:
+    """Return the message of an error of usd-core on one line; it may have bytes that are not UTF-8."""
+    try:
+        text = str(error)
+    except UnicodeDecodeError as wrong:
+        text = wrong.object.decode("utf-8", errors="replace")
+    return WHERE.sub("", " ".join(text.split()))[:MOST_SAID]
+
+
+def _file_of(layer: Any) -> str:
+    """Return the path of the file that a layer is in."""
+    return str(layer.realPath or layer.identifier).partition("[")[0]
+
+
+def _numbered(own: str, name: str) -> list[str]:
+    """Return the files of which # in a name, relative to a layer's, stands for digits."""
+    folder, base = os.path.split(name)
+    pattern = re.compile(re.sub(r"(\\#)+", r"\\d+", re.escape(base)))
+    there = Path(own).parent / folder
+    found = sorted(os.listdir(there)) if there.is_dir() else []
+    return [os.path.join(folder, each) for each in found if pattern.fullmatch(each)]
