@@ -21,6 +21,7 @@ from wavefront.scheduling import jobs
 
 sys.path.insert(0, str(Path(__file__).parent.parent / "examples"))
 from cornell_box import cornell_box
+from options import several
 
 SIZE, BLOCK = 24, 8
 
@@ -51,7 +52,7 @@ def measure(scene: wf.Scene, noise: float, seeds: int, tile: int) -> tuple[np.nd
 def main() -> None:
     """Print the table."""
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--seeds", type=int, default=64)
+    parser.add_argument("--seeds", type=several, default=64, help="2 or more")
     parser.add_argument("--reference-spp", type=int, default=16384)
     options = parser.parse_args()
     print(f"{'scene':<8} {'noise':>6} {'tile':>4} {'spp':>7} {'bias of the mean':>20} {'worst block':>20}")

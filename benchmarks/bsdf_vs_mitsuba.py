@@ -14,6 +14,7 @@ the largest difference is printed beside.
 
 from __future__ import annotations
 
+import argparse
 import sys
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -233,7 +234,11 @@ def compare(pairs: int = 10_000) -> list[Row]:
 
 def main(report: Callable[[str], None] = print) -> int:
     """Print the table; return 1 if any difference is above the limit."""
-    rows = compare(int(sys.argv[1]) if len(sys.argv) > 1 else 10_000)
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
+    parser.add_argument("pairs", type=int, nargs="?", default=10_000, help="of directions")
+    rows = compare(parser.parse_args().pairs)
     report(f"{'material':<30} {'quantity':<10} {'99 % of pairs':>14} {'largest':>10}")
     for r in rows:
         mark = "" if r.difference <= r.limit else "  above the limit"

@@ -23,6 +23,7 @@ ROOT = Path(__file__).resolve().parents[1]
 sys.path.insert(0, str(ROOT / "examples"))
 from cornell_box import cornell_box  # noqa: E402
 from mitsuba_scene import to_mitsuba  # noqa: E402
+from options import several  # noqa: E402
 
 ABSORPTION, SCATTERING, G, BOUNCES = 0.1, 0.5, 0.3, 7
 HALF = 0.999  # of the box of fog: the camera is outside
@@ -84,7 +85,7 @@ def main() -> None:
     parser.add_argument("--variants", nargs="*", default=["llvm_ad_rgb", "scalar_rgb"])
     parser.add_argument("--spp", type=int, default=32)
     parser.add_argument("--size", type=int, default=128)
-    parser.add_argument("--runs", type=int, default=6)
+    parser.add_argument("--runs", type=several, default=6, help="2 or more")
     options = parser.parse_args()
     spp, size = options.spp, options.size
     scene = ours(size)

@@ -10,8 +10,9 @@ Light that is scattered once is computed, and what is scattered more often comes
 the paper, the transformation is fitted to f·cosθ on a grid of angles by the sum of cubed differences.
 """
 
+import argparse
+
 import numpy as np
-from scipy.optimize import minimize
 
 F4 = np.float32
 GRID = 20  # angles of each kind, of which the transformation is fitted to GRID²
@@ -101,6 +102,8 @@ def density(a: float, b: float, w: np.ndarray) -> np.ndarray:
 
 def transformation(albedo: float, value: np.ndarray, start: np.ndarray) -> np.ndarray:
     """Return A and B of the paper that fit f·cosθ on the grid."""
+    from scipy.optimize import minimize  # here, so that --help does not need it
+
     grid = angles().astype(float)
     return minimize(
         lambda ab: (np.abs(albedo * density(*ab, grid) - value) ** 3).sum(),
@@ -150,4 +153,7 @@ def main() -> None:
 
 
 if __name__ == "__main__":
+    argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    ).parse_args()
     main()

@@ -1,6 +1,6 @@
 """Variance at equal time with 1000 lights, against 10 lights of the same total power.
 
-python benchmarks/many_lights.py [--spp 16] [--size 128] [--repeat 4] [--accel numpy]
+python benchmarks/many_lights.py [--spp 16] [--size 128] [--repeat 6] [--accel numpy]
 
 A hall of columns lit by square panels or by point lights under its ceiling, 10 of them or 1000, that
 together give the same power. For each number and each way of choosing a light: variance of a pixel
@@ -14,6 +14,7 @@ import argparse
 from statistics import median
 
 import numpy as np
+from options import several
 
 import wavefront as wf
 
@@ -102,7 +103,7 @@ if __name__ == "__main__":
     )
     parser.add_argument("--spp", type=int, default=16)
     parser.add_argument("--size", type=int, default=128)
-    parser.add_argument("--repeat", type=int, default=6)
+    parser.add_argument("--repeat", type=several, default=6, help="renders of each, 2 or more")
     parser.add_argument("--accel", default="numpy")
     options = parser.parse_args()
     print(f"{'lights':14}{'choice':>10}{'variance':>12}{'seconds':>10}{'variance x time':>18}")

@@ -16,6 +16,7 @@ import time
 from pathlib import Path
 
 import numpy as np
+from options import several
 
 import wavefront as wf
 
@@ -88,7 +89,7 @@ def save_picture(path: str) -> None:
 if __name__ == "__main__":
     parser = argparse.ArgumentParser(description='"naive" beside "full" at equal time.')
     parser.add_argument("--size", type=int, default=48)
-    parser.add_argument("--repeats", type=int, default=8)
+    parser.add_argument("--repeats", type=several, default=8, help="2 or more")
     parser.add_argument("--picture")
     options = parser.parse_args()
     print(f"{'lamp':<6}{'estimator':<11}{'mean':>8}{'MSE':>12}{'CPU s':>8}{'MSE · s':>11}{'ratio':>8}")

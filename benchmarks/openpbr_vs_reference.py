@@ -7,8 +7,8 @@ lobe the albedos, and the differences of f·cosθ and of the density. A film is 
 reference over wavelengths, by the matching functions that the film here stands for.
 """
 
+import argparse
 import subprocess
-import sys
 import tempfile
 from pathlib import Path
 from typing import NamedTuple
@@ -224,4 +224,10 @@ def main(reference: str, glm: str) -> None:
 
 
 if __name__ == "__main__":
-    main(*sys.argv[1:3])
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
+    parser.add_argument("reference", metavar="OPENPBR_BSDF", help="folder of github.com/adobe/openpbr-bsdf")
+    parser.add_argument("glm", metavar="GLM", help="folder of github.com/g-truc/glm")
+    options = parser.parse_args()
+    main(options.reference, options.glm)

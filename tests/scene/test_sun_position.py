@@ -1,6 +1,7 @@
 """The direction to the sun: axes, and the algorithm where pvlib is installed."""
 
 import sys
+from datetime import datetime
 from types import ModuleType
 
 import numpy as np
@@ -89,3 +90,20 @@ def test_the_algorithm() -> None:
     np.testing.assert_allclose(sun, due, atol=2e-5)
     with pytest.raises(wf.SceneError, match="time is 'noon'"):
         wf.sun_position("noon", 48, 11)
+
+
+@pytest.mark.parametrize(
+    "time",
+    [
+        "2026-06-21 12:00",
+        datetime(2026, 6, 21, 12),
+        np.datetime64("2026-06-21T12:00"),
+        ["2026-06-21 12:00"] * 2,
+    ],
+)
+def test_a_time_without_a_zone_is_taken_for_utc_with_a_warning(time) -> None:
+    pytest.importorskip("pvlib")
+    with pytest.warns(UserWarning, match="the time 2026-06-21 12:00:00 has no zone and is taken for UTC"):
+        sun = wf.sun_position(time, 48.1, 11.6)
+    known = wf.sun_position("2026-06-21 14:00+02:00", 48.1, 11.6)
+    assert np.abs(sun - known).max() < 1e-12

@@ -7,25 +7,29 @@ and integrators of a user's own give the same AOVs if they are made of the same 
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from typing import Any
 
 import numpy as np
 
 from ..arrays.soa import soa
 from ..arrays.state import BounceDepth, Contribution, Hits, Paths
 from ..arrays.vec import Bools, Bytes, Floats, Ints, add_to_slots, broadcast, f4, put, take
+from ..colors import EFFICACY
 from ..compile.light_groups import PATCHED, LightGroups
 from ..compile.scene import CompiledScene
 from ..core.errors import SceneError
-from ..film.aov_names import AOVS, CLAMPED, KEYED_AOVS
+from ..film.aov_names import AOVS, CLAMPED, KEYED_AOVS, LUX
 from ..film.aov_samples import BOUNDED, AovSamples, FixedPointSamples, fixed_point
 from ..stages.compact import compact
 from ..stages.interaction import interaction
 from ..stages.normal_mapping import perturb_normals
 from ..stages.shade import Shading, shading
+from .lux import lux_of
 from .path_recorder import MetSurfaces, PathRecorder
 
 FEATURES = ("denoising_albedo", "denoising_normal")
 OF_LIGHT = ("direct", "indirect", "light_groups", CLAMPED)
+BY_LIGHT = ("light_groups", LUX)  # what parts of the light are told apart for by the light they are from
 
 
 @soa
@@ -66,12 +70,13 @@ class SampleRecorder(PathRecorder):
         self._clamp = clamp
         if CLAMPED in wanted:
             self._light[CLAMPED] = np.zeros((3, n), f4)
-        self._groups = scene.light_groups if "light_groups" in wanted else None
+        self._groups = LightByGroup(scene.light_groups, n) if "light_groups" in wanted else None
         if self._groups is not None:
-            self._of_groups = np.zeros((len(self._groups.names), 3, n), f4)
-            parts = zip(self._groups.names, self._of_groups, strict=True)
-            self._light.update((f"light_groups.{name}", light) for name, light in parts)
-            self.needs_directions = self._groups.need_directions
+            self._light.update((f"light_groups.{name}", light) for name, light in self._groups.items())
+        several = LUX in wanted and len(scene.light_efficacies.names) > 1  # else it follows from the radiance
+        self._efficacies = LightByGroup(scene.light_efficacies, n) if several else None
+        self._divided = [each for each in (self._groups, self._efficacies) if each is not None]
+        self.needs_directions = any(each.groups.need_directions for each in self._divided)
         self._awaited: AwaitedSurfaces | None = None
         self._begun = False
         self._all_rough = True  # no first surface is specular
@@ -80,7 +85,9 @@ class SampleRecorder(PathRecorder):
         self._shared: SampleRecorder | None = None  # of the paths from shared points
 
     def prepare(self, paths: Paths) -> None:
-        """Have paths that start at the camera carry the recorder."""
+        """Have paths that start at the camera carry the recorder, if it needs them."""
+        if self._wanted == (LUX,) and not self._divided:
+            return
         paths.recorder = self
         if "direct" in self._light or CLAMPED in self._light:
             paths.depth = broadcast(np.uint8(BounceDepth.CAMERA), len(paths))
@@ -93,15 +100,17 @@ class SampleRecorder(PathRecorder):
 
     def of_shared(self, count: int) -> SampleRecorder | None:
         """Return what divides the light of so many shared points among the groups of lights."""
-        if self._groups is not None:
-            self._shared = SampleRecorder(("light_groups",), self._scene, count)
+        if self._divided:
+            wanted = [name for name in BY_LIGHT if name in self._wanted]
+            self._shared = SampleRecorder(wanted, self._scene, count)
         return self._shared
 
     def parts_of_shared(self) -> list[tuple[Floats, Floats]]:
         """Return the light of each group, of the samples and of the shared points."""
         if self._shared is None:
             return []
-        return [(self._light[name], light) for name, light in self._shared._light.items()]
+        parts = zip(self._divided, self._shared._divided, strict=True)
+        return [pair for one, shared in parts for pair in zip(one.light, shared.light, strict=True)]
 
     # --- Surfaces -------------------------------------------------------------------------------------
 
@@ -211,37 +220,8 @@ class SampleRecorder(PathRecorder):
             and (paths.depth != BounceDepth.INDIRECT).any()
         ):
             self._add("direct", np.flatnonzero(_is_direct(paths.depth, contribution)), slot, arriving)
-        if self._groups is not None:
-            self._record_groups(self._groups, paths, contribution, slot, arriving)
-
-    def _record_groups(
-        self, groups: LightGroups, paths: Paths, contribution: Contribution, slot: Ints, arriving: Floats
-    ) -> None:
-        """Record light (3, k) by groups; that of an environment of several ones is divided among them."""
-        group = groups.of_light.take(contribution.light)
-        toward = contribution.wi
-        if toward is None and groups.need_directions:
-            toward = take(paths.direction, contribution.lanes)
-        if groups.patches is not None:
-            assert toward is not None
-            group = np.where(group == PATCHED, groups.patches.number(toward), group)
-        known = np.flatnonzero(group >= 0)
-        if known.size == slot.size:
-            self._add_to_groups(group, slot, arriving)
-        elif known.size:
-            self._add_to_groups(group.take(known), slot.take(known), take(arriving, known))
-        mixed = np.flatnonzero(group < 0)
-        if mixed.size:
-            assert toward is not None
-            for name, part in groups.parts_of_environment(take(toward, mixed)):
-                light = take(arriving, mixed) * part
-                add_to_slots(self._light[f"light_groups.{name}"], slot.take(mixed), light)
-
-    def _add_to_groups(self, group: Ints, slot: Ints, arriving: Floats) -> None:
-        count, channels, n = self._of_groups.shape
-        sums = self._of_groups.reshape(count * channels * n)
-        for channel, values in enumerate(arriving):
-            np.add.at(sums, (group * channels + channel) * n + slot, values)
+        for each in self._divided:
+            each.record(paths, contribution, slot, arriving)
 
     def record_background(self, slot: Ints, color: Floats) -> None:
         """Record a background (3, 1) that has been added to slots (k,)."""
@@ -273,6 +253,9 @@ class SampleRecorder(PathRecorder):
         """
         self._check(integrator, radiance)
         self._shade_awaited()
+        if LUX in self._wanted:
+            parts = [radiance] if self._efficacies is None else list(self._efficacies.light)
+            self._light[LUX] = lux_of(self._scene.light_efficacies.names or (EFFICACY,), parts)
         finite: Bools = np.ones(radiance.shape[1], np.bool_)
         for values in (*self._values.values(), *self._light.values()):
             for row in values:
@@ -313,16 +296,64 @@ class SampleRecorder(PathRecorder):
     def _check(self, integrator: object, radiance: Floats) -> None:
         label = getattr(integrator, "__name__", repr(integrator))
         for name in self._wanted:
-            if name in OF_LIGHT and self._picture is not radiance:
+            needs_light = name in OF_LIGHT or (name == LUX and self._efficacies is not None)
+            if needs_light and self._picture is not radiance:
                 raise SceneError(
                     f"the integrator {label} cannot give the AOV {name!r}: all light must be added by "
                     "wavefront.integrators.accumulate to the array that it returns"
                 )
-            if name not in OF_LIGHT and not self._begun:
+            if name not in (*OF_LIGHT, LUX) and not self._begun:
                 raise SceneError(
                     f"the integrator {label} cannot give the AOV {name!r}: its paths must find their "
                     "surfaces by wavefront.integrators.intersect_and_compact"
                 )
+
+
+class LightByGroup:
+    """The light of each group, (3, n) for n samples.
+
+    Parameters
+    ----------
+    groups
+        The groups.
+    n
+        Samples of the wave.
+    """
+
+    def __init__(self, groups: LightGroups[Any], n: int) -> None:
+        self.groups, self.light = groups, np.zeros((len(groups.names), 3, n), f4)
+
+    def items(self) -> Iterator[tuple[Any, Floats]]:
+        """Return the names of the groups, and their light (3, n)."""
+        return zip(self.groups.names, self.light, strict=True)
+
+    def record(self, paths: Paths, contribution: Contribution, slot: Ints, arriving: Floats) -> None:
+        """Record light (3, k) of slots (k,); that of a mixed environment is divided among its groups."""
+        groups = self.groups
+        group = groups.of_light.take(contribution.light)
+        toward = contribution.wi
+        if toward is None and groups.need_directions:
+            toward = take(paths.direction, contribution.lanes)
+        if groups.patches is not None:
+            assert toward is not None
+            group = np.where(group == PATCHED, groups.patches.number(toward), group)
+        known = np.flatnonzero(group >= 0)
+        if known.size == slot.size:
+            self._add(group, slot, arriving)
+        elif known.size:
+            self._add(group.take(known), slot.take(known), take(arriving, known))
+        mixed = np.flatnonzero(group < 0)
+        if mixed.size:
+            assert toward is not None
+            for name, part in groups.parts_of_environment(take(toward, mixed)):
+                light = self.light[groups.names.index(name)]
+                add_to_slots(light, slot.take(mixed), take(arriving, mixed) * part)
+
+    def _add(self, group: Ints, slot: Ints, arriving: Floats) -> None:
+        count, channels, n = self.light.shape
+        sums = self.light.reshape(count * channels * n)
+        for channel, values in enumerate(arriving):
+            np.add.at(sums, (group * channels + channel) * n + slot, values)
 
 
 class Coverage:

@@ -2,12 +2,14 @@
 
 from .color import is_color_name, named_rows, rgb, srgb
 from .colormaps import warn_of_colormap
-from .photometry import EFFICACY, exposure, from_photometric, to_photometric
+from .photometry import DAYLIGHT, EFFICACY, Photometric, exposure, from_photometric, to_photometric
 from .temperature import blackbody
 from .transfer import linear_to_srgb, srgb_to_linear
 
 __all__ = [
+    "DAYLIGHT",
     "EFFICACY",
+    "Photometric",
     "blackbody",
     "exposure",
     "from_photometric",

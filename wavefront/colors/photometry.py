@@ -10,31 +10,62 @@ for a spectrum that is even over visible light (G. Ward Larson and R. Shakespear
 from __future__ import annotations
 
 import math
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ..arrays.vec import Doubles
 from ..core.errors import SceneError, as_array, number
 from ..core.suggestions import suggests_keywords
 from .color import rgb
 
 EFFICACY = 683.0  # lm/W
+DAYLIGHT = 110.0  # lm/W of sun and sky, about: of all their watts, visible or not
 WEIGHTS = (0.2126, 0.7152, 0.0722)  # of linear RGB in luminance, ITU-R BT.709
 WHITE = 1.2  # cd/m² that are white in a picture at EV100 = 0: 78 / (100 · 0.65)
 
 
+class Photometric(np.ndarray[Any, Any]):
+    """Linear RGB that was given as a photometric quantity, from `from_photometric`.
+
+    It is an array like others, and knows how many lm/W were taken for white. A `Sky`, whose watts are else
+    those of the whole spectrum, reads that.
+    """
+
+    efficacy: float
+
+    def __array_finalize__(self, source: Any) -> None:
+        """Take the efficacy over from the array that this one was made of."""
+        self.efficacy = getattr(source, "efficacy", EFFICACY)
+
+    def __reduce__(self) -> Any:
+        """Keep the efficacy in pickles."""
+        return photometric, (np.asarray(self), self.efficacy)
+
+
+def photometric(values: NDArray[Any], efficacy: float) -> Photometric:
+    """Return RGB (...) that were given with an efficacy, lm/W."""
+    found = values.view(Photometric)
+    found.efficacy = efficacy
+    return found
+
+
 @suggests_keywords
-def to_photometric(radiometric: ArrayLike, *, efficacy: float = EFFICACY) -> NDArray[np.floating]:
+def to_photometric(radiometric: Any, *, efficacy: float = EFFICACY) -> NDArray[np.floating]:
     """Return the luminance of radiance, the illuminance of irradiance, or the lumens of watts.
+
+    An array is taken for watts of one kind of light, that of `efficacy`: of lights that were given in lumens,
+    lux or candela, by `from_photometric`, `with_flux` or `IESLight`. Watts of a whole spectrum, such as
+    those of weather files and of a `Sky.perez` made from them, have about 110 lm/W. Where a scene has lights
+    of both, no factor is right for their sum: a `Measurement` keeps them apart, and gives its `lux` here.
 
     Parameters
     ----------
     radiometric
         (..., 3) linear RGB, or one number for gray: radiance gives cd/m², irradiance lux, intensity
-        candela, power lumen.
+        candela, power lumen. Or a `Measurement`, for its `lux`.
     efficacy
-        lm/W of white: 683, or 179 as in Radiance.
+        lm/W of white: 683, or 179 as in Radiance. A measurement has those of its lights.
 
     Returns
     -------
@@ -44,13 +75,17 @@ def to_photometric(radiometric: ArrayLike, *, efficacy: float = EFFICACY) -> NDA
     Raises
     ------
     SceneError
-        If there are not three channels, or the efficacy is not above 0.
+        If there are not three channels, the efficacy is not above 0, or one is given for a measurement.
 
     Examples
     --------
     >>> float(wf.to_photometric((1, 1, 1)))
     683.0
     """
+    if hasattr(radiometric, "lux"):
+        if efficacy != EFFICACY:
+            raise SceneError(f"efficacy is {efficacy!r}; a measurement has the efficacies of its lights")
+        return np.asarray(radiometric.lux)
     values = as_array("radiometric", radiometric)
     values = np.broadcast_to(values, 3) if values.ndim == 0 else values
     if values.ndim < 1 or values.shape[-1] != 3:
@@ -61,7 +96,7 @@ def to_photometric(radiometric: ArrayLike, *, efficacy: float = EFFICACY) -> NDA
 
 
 @suggests_keywords
-def from_photometric(value: float, color: ArrayLike = 1.0, *, efficacy: float = EFFICACY) -> Doubles:
+def from_photometric(value: float, color: ArrayLike = 1.0, *, efficacy: float = EFFICACY) -> Photometric:
     """Return linear RGB (3,) of a color whose photometric quantity is `value`.
 
     Parameters
@@ -89,7 +124,7 @@ def from_photometric(value: float, color: ArrayLike = 1.0, *, efficacy: float = 
     seen = float(to_photometric(channels, efficacy=efficacy))
     if seen <= 0:
         raise SceneError("photometric color is black; it must have a luminance")
-    return channels * (value / seen)
+    return photometric(channels * (value / seen), float(efficacy))
 
 
 @suggests_keywords

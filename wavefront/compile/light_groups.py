@@ -1,28 +1,43 @@
-"""The groups of lights: for which layer of radiance each light counts."""
+"""The groups of lights: for which layer of radiance each light counts, and by which efficacy for lux."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Hashable, Iterator, Sequence
 from dataclasses import replace
+from typing import Generic, NamedTuple, TypeVar
 
 import numpy as np
 
 from ..arrays.soa import soa
 from ..arrays.vec import Floats, Ints
+from ..colors import EFFICACY
+from ..core.errors import number
 from ..film.aov_names import DEFAULT_GROUP, group_name
 from ..lights import EnvironmentSum, InfiniteLight, Light, PatchedEnvironment, SkyPatches
 from ..shapes import CurvedShape, Mesh
 
 PATCHED = -2  # the group of an environment whose patches are groups
 
+K = TypeVar("K", bound=Hashable)  # what groups are known by
+
+
+class LightKey(NamedTuple):
+    """What lights are told apart by."""
+
+    group: str
+    efficacy: float  # lm/W
+
+
+BY_DEFAULT = LightKey(DEFAULT_GROUP, EFFICACY)  # light of media
+
 
 @soa
-class LightGroups:
+class LightGroups(Generic[K]):
     """The group of each light of a scene, and of the parts of its environment."""
 
-    names: tuple[str, ...]
+    names: tuple[K, ...]
     of_light: Ints  # (lights,) number of the group; -1 of an environment of several groups, PATCHED
-    environment: tuple[tuple[str, InfiniteLight], ...]  # the groups of the environment, and what they send
+    environment: tuple[tuple[K, InfiniteLight], ...]  # the groups of the environment, and what they send
     patches: SkyPatches | None = None  # of an environment each of whose patches is a group, the first ones
 
     @property
@@ -30,12 +45,12 @@ class LightGroups:
         """Whether the group of light depends on where it comes from."""
         return len(self.environment) > 1 or self.patches is not None
 
-    def with_media(self) -> LightGroups:
-        """Return the groups with light of media, number -1, in the default one."""
-        names = self.names if DEFAULT_GROUP in self.names else (*self.names, DEFAULT_GROUP)
-        return replace(self, names=names, of_light=np.append(self.of_light, names.index(DEFAULT_GROUP)))
+    def with_light(self, name: K) -> LightGroups[K]:
+        """Return the groups with one more light, the last one, in the group of this name."""
+        names = self.names if name in self.names else (*self.names, name)
+        return replace(self, names=names, of_light=np.append(self.of_light, names.index(name)))
 
-    def parts_of_environment(self, wi: Floats) -> Iterator[tuple[str, Floats]]:
+    def parts_of_environment(self, wi: Floats) -> Iterator[tuple[K, Floats]]:
         """Yield each group of the environment, and its part (3, n) of the radiance from wi (3, n)."""
         radiances = [light.le(wi) for _, light in self.environment]
         total = np.zeros_like(wi)
@@ -52,54 +67,76 @@ def primitive_count(shape: Mesh | CurvedShape) -> int:
 
 
 class GroupNumbers:
-    """Numbers the groups of the lights of a scene, while its table of lights is built."""
+    """Numbers what the lights of a scene are told apart by, while its table of lights is built."""
 
     def __init__(self) -> None:
-        self._numbers: dict[str, int] = {}
+        self._numbers: dict[LightKey, int] = {}
         self._of_light: list[Ints] = []
-        self._environment: dict[str, list[InfiniteLight]] = {}
+        self._environment: list[tuple[LightKey, InfiniteLight]] = []
 
     def number(self, light: Light) -> int:
-        """Return the number of the group of a light.
+        """Return the number of the key of a light.
 
         Raises
         ------
         SceneError
-            If the group of a light is no name.
+            If the group of a light is no name, or its efficacy is not above 0.
         """
-        return self._number(group_name(f"{type(light).__name__} group", light.group))
+        return self._number(_key(light))
 
     def default(self) -> int:
-        """Return the number of the default group."""
-        return self._number(DEFAULT_GROUP)
+        """Return the number of light of media."""
+        return self._number(BY_DEFAULT)
 
     def of_shapes(self, shapes: Sequence[Mesh | CurvedShape]) -> Ints:
-        """Return the group of each primitive of shapes; it is -1 of those that are dark."""
-        numbers = [-1 if shape.emission is None else self._number(shape.material.group) for shape in shapes]
+        """Return the number of each primitive of shapes; it is -1 of those that are dark."""
+        keys = [LightKey(shape.material.group, shape.material.efficacy) for shape in shapes]
+        numbers = [
+            -1 if shape.emission is None else self._number(key)
+            for shape, key in zip(shapes, keys, strict=True)
+        ]
         return np.repeat(np.array(numbers, np.intp), [primitive_count(shape) for shape in shapes])
 
     def add(self, numbers: Ints) -> None:
-        """Add the next lights of the table by the numbers (k,) of their groups."""
+        """Add the next lights of the table by their numbers (k,)."""
         self._of_light.append(numbers)
 
     def add_to_environment(self, light: Light, record: InfiniteLight) -> None:
         """Add a part of the environment."""
         self.number(light)
-        self._environment.setdefault(light.group, []).append(record)
+        self._environment.append((_key(light), record))
 
-    def _number(self, name: str) -> int:
-        return self._numbers.setdefault(name, len(self._numbers))
+    def _number(self, key: LightKey) -> int:
+        return self._numbers.setdefault(key, len(self._numbers))
 
-    def groups(self) -> LightGroups:
-        """Return the groups; the environment is the last light."""
-        parts = tuple((name, EnvironmentSum.of(lights)) for name, lights in self._environment.items())
-        if len(parts) == 1 and isinstance(parts[0][1], PatchedEnvironment):
-            self.add(np.array([PATCHED]))
-            numbers = np.concatenate([np.zeros(0, np.intp), *self._of_light])
-            numbers = np.where(numbers >= 0, numbers + len(parts[0][1].names), numbers)
-            return LightGroups((*parts[0][1].names, *self._numbers), numbers, (), parts[0][1].patches)
+    def groups(self) -> LightGroups[str]:
+        """Return the groups by their names; the environment is the last light."""
+        found = self._by(lambda key: key.group)
+        if len(found.environment) != 1 or not isinstance(found.environment[0][1], PatchedEnvironment):
+            return found
+        patched = found.environment[0][1]
+        of_light = np.append(found.of_light[:-1] + len(patched.names), PATCHED)
+        return LightGroups((*patched.names, *found.names), of_light, (), patched.patches)
+
+    def efficacies(self) -> LightGroups[float]:
+        """Return the lights by their efficacy, lm/W; the environment is the last light."""
+        return self._by(lambda key: key.efficacy)
+
+    def _by(self, name_of: Callable[[LightKey], K]) -> LightGroups[K]:
+        """Return the groups of lights of which `name_of` tells the same name."""
+        names = tuple(dict.fromkeys(map(name_of, self._numbers)))
+        group = np.array([names.index(name_of(key)) for key in self._numbers], np.intp)
+        of_light = group.take(np.concatenate([np.zeros(0, np.intp), *self._of_light]))
+        joined: dict[K, list[InfiniteLight]] = {}
+        for key, light in self._environment:
+            joined.setdefault(name_of(key), []).append(light)
+        parts = tuple((name, EnvironmentSum.of(lights)) for name, lights in joined.items())
         if parts:
-            self.add(np.array([self._number(parts[0][0]) if len(parts) == 1 else -1]))
-        return LightGroups(
-            tuple(self._numbers), np.concatenate([np.zeros(0, np.intp), *self._of_light]), parts
-        )
+            of_light = np.append(of_light, names.index(parts[0][0]) if len(parts) == 1 else -1)
+        return LightGroups(names, of_light, parts)
+
+
+def _key(light: Light) -> LightKey:
+    name = type(light).__name__
+    efficacy = number(f"{name} efficacy", light.efficacy, lambda x: x > 0, "above 0 lm/W")
+    return LightKey(group_name(f"{name} group", light.group), efficacy)

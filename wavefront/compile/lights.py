@@ -34,7 +34,7 @@ from ..scene import Scene
 from ..shapes import CurvedShape, Mesh, Shape, Sphere, Spheres
 from ..shapes.attributes import ATTRIBUTES
 from ..textures.base import BaseTexture
-from .light_groups import GroupNumbers, LightGroups, primitive_count
+from .light_groups import GroupNumbers, primitive_count
 
 # A record, and the primitives of its lights: (..., k) a column per light, or (..., m) of one light, or none.
 Part: TypeAlias = tuple[LightRecord, Ints | None]
@@ -61,8 +61,8 @@ def gather_lights(
     choice: str | LightSamplerMaker,
     mis: bool,
     glowing: Sequence[LightRecord] = (),
-) -> tuple[LightTable, LightGroups, Ints, int]:
-    """Return the table of lights, their groups, and the light of each primitive and of rays that miss.
+) -> tuple[LightTable, GroupNumbers, Ints, int]:
+    """Return the lights, what tells them apart, and the light of each primitive and of rays that miss.
 
     Parameters
     ----------
@@ -120,7 +120,7 @@ def gather_lights(
     kinds = [record for record, _ in parts]
     if infinite:
         kinds.append(EnvironmentSum.of(infinite))
-    return LightTable(kinds, half_size, choice), groups.groups(), light_of, count if infinite else -1
+    return LightTable(kinds, half_size, choice), groups, light_of, count if infinite else -1
 
 
 def _first_rows(shapes: Sequence[Mesh | CurvedShape]) -> tuple[dict[int, int], int]:

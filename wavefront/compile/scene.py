@@ -18,7 +18,7 @@ from ..shapes.attributes import Corners, corner_values
 from .curved import CurvedTable
 from .geometry import compute_corner_normals, gather_triangles, same_as_next
 from .instances import InstanceTable, own_frame, place_instances, sort_shapes
-from .light_groups import LightGroups
+from .light_groups import BY_DEFAULT, LightGroups
 from .lights import find_backdrop, gather_lights
 from .materials import (
     MaterialTable,
@@ -70,7 +70,8 @@ class CompiledScene:
     absorption: Floats | None  # (3, materials) per unit of length; None when nothing absorbs
     opacities: Opacities | None  # None when every surface is opaque
     lights: LightTable
-    light_groups: LightGroups
+    light_groups: LightGroups[str]
+    light_efficacies: LightGroups[float]  # lm/W, for measurements
     # (lights,) those whose surface scatters nothing; None when there are none
     nonscattering_lights: Bools | None
     instances: InstanceTable | None = None  # None when no mesh is instanced
@@ -160,7 +161,7 @@ def compile_scene(
     glowing, of_media = glow_lights(media)
     phases = phase_materials(filled)
     user_materials += phases
-    lights, groups, light_of, environment = gather_lights(
+    lights, numbered, light_of, environment = gather_lights(
         scene, scaled, scale, meshes, curved, vertices, center, (high - low) / 2, light_sampler, mis, glowing
     )
     if media is not None and glowing:
@@ -191,6 +192,7 @@ def compile_scene(
         specular = find_specular_surfaces(
             triangles[:once], table_of_curved, material_of.take(whole), light_of.take(whole), groups_of
         )
+    groups, efficacies = numbered.groups(), numbered.efficacies()
     absorption = absorption_table(user_materials) if media is None else None
     if media is not None:
         # events in media have the numbers from -2 down, so their entries are those before that of a miss
@@ -198,7 +200,11 @@ def compile_scene(
         material_of = np.concatenate([material_of, rows[::-1], [0]])
         light_of = np.append(light_of, np.full(len(phases), -1))
         has_alpha = np.append(has_alpha, np.zeros(len(phases), np.bool_))
-        groups = groups.with_media() if media.glows else groups
+        if media.glows:
+            groups, efficacies = (
+                groups.with_light(BY_DEFAULT.group),
+                efficacies.with_light(BY_DEFAULT.efficacy),
+            )
     light_of = np.append(light_of, environment)
     return CompiledScene(
         scale=scale,
@@ -219,6 +225,7 @@ def compile_scene(
         opacities=opacity_table(user_materials, has_alpha),
         lights=lights,
         light_groups=groups,
+        light_efficacies=efficacies,
         nonscattering_lights=nonscattering_lights,
         backdrop=find_backdrop(scene, scale, center),
         instances=table,

@@ -234,7 +234,6 @@ SYNONYMS: dict[str, tuple[str, ...]] = {
     "comparison.ssim": ("comparison.flip, comparison.psnr or comparison.relative_mse",),
     "comparison.mse": ("comparison.rmse ** 2, or relative_mse",),
     "measurement.illuminance": ("wf.to_photometric(measurement.value)",),
-    "measurement.lux": ("wf.to_photometric(measurement.value)",),
     "measurement.luminance": ("wf.to_photometric(measurement.value)",),
     "measurement.mean": ("value",),
     # things of the package, and choices

@@ -58,6 +58,12 @@ CLAMPED = "clamped"
 GIVEN_AOVS: dict[str, Aov] = {  # AOVs that a setting gives, beside those that are asked for
     CLAMPED: _sampled(3, "radiance that the setting `clamp` removed"),
 }
+LUX = "lux"
+MEASURED_AOVS: dict[str, Aov] = {  # AOVs that measurements have, whose errors come from batches of samples
+    LUX: _sampled(3, "photometric light: all, that of broadband lights, that of lights of visible watts"),
+}
+# what follows the name of such an AOV in those of the layers with its error, and the variance of a sample
+STANDARD_ERROR, VARIANCE = "_error", "_variance"
 BOXES = "boxes"  # of objects: no array, but `Image.boxes`
 ALL_AOVS = "all"  # stands for all of `AOVS`, and for nothing else
 
@@ -89,7 +95,7 @@ def geometric_names(chosen: Iterable[str]) -> tuple[str, ...]:
 
 def aov_of(name: str) -> Aov:
     """Return an AOV by its name, that of an AOV with a key such as "light_groups.sun"."""
-    return {**AOVS, **KEYED_AOVS, **GIVEN_AOVS}[name.partition(".")[0]]
+    return {**AOVS, **KEYED_AOVS, **GIVEN_AOVS, **MEASURED_AOVS}[name.partition(".")[0]]
 
 
 def chosen_aovs(name: str, value: Any) -> tuple[str, ...]:

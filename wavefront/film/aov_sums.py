@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from ..arrays.soa import soa
 from ..arrays.state import Words
 from ..arrays.vec import Doubles, Floats, Ints, Lanes, f4
-from .aov_names import aov_of
+from .aov_names import MEASURED_AOVS, aov_of
 from .aov_samples import (
     BOUNDED,
     COUNTED,
@@ -21,7 +21,7 @@ from .aov_samples import (
     FixedPointSamples,
 )
 from .exact_sum import ExactSums
-from .film import CHUNK, add_in_order, chunks, pixel_span
+from .film import CHUNK, NONE, Film, add_in_order, chunks, pixel_span
 from .sums import Sums
 
 UNIT = 2.0**-FRACTION_BITS
@@ -34,6 +34,7 @@ class AovEstimate:
 
     mean: Floats  # (pixels, c)
     standard_error: Floats  # (pixels, c) of `mean`; NaN for fewer than two samples
+    variance: Floats | None = None  # (pixels, c) of one sample, of AOVs of measurements
 
 
 class CountSums(Sums):
@@ -166,12 +167,13 @@ class AovSums(Sums):
     counts: dict[str, CountSums]
     bounded: dict[str, FixedPointSums]
     radiance: dict[str, RadianceSums]
+    measured: dict[str, Film]
     indirect: SquareSums | None  # its sums are those of the picture less those of "direct"
 
     def __init__(self, names: Iterable[str], pixels: int) -> None:
         self.names = tuple(names)
         self._pixels = pixels
-        self.counts, self.bounded, self.radiance = {}, {}, {}
+        self.counts, self.bounded, self.radiance, self.measured = {}, {}, {}, {}
         self.indirect = SquareSums(pixels) if "indirect" in self.names else None
         for name in self.names:
             kind = name.partition(".")[0]
@@ -179,12 +181,16 @@ class AovSums(Sums):
                 self.counts[name] = CountSums(pixels)
             elif kind in BOUNDED:
                 self.bounded[name] = FixedPointSums((aov_of(name).channels, pixels))
+            elif kind in MEASURED_AOVS:
+                self.measured[name] = Film(pixels, 1)
             elif kind != "indirect":
                 self.radiance[name] = RadianceSums(pixels)
         if self.indirect is not None and "direct" not in self.radiance:
             self.radiance["direct"] = RadianceSums(pixels)
 
-    def add(self, pixels: Words, samples: AovSamples, radiance: Floats, most: int) -> None:
+    def add(
+        self, pixels: Words, samples: AovSamples, radiance: Floats, most: int, dropped: Ints = NONE
+    ) -> None:
         """Add samples.
 
         Parameters
@@ -195,12 +201,16 @@ class AovSums(Sums):
             The next samples of each pixel, and their radiance (3, samples, k).
         most
             No pixel has more samples than this afterwards.
+        dropped
+            As for `Film.add`.
         """
         lanes = pixel_span(pixels)
         for name, counts in self.counts.items():
             counts.add(lanes, samples.counts[name])
         for name, bounded in self.bounded.items():
             bounded.add(lanes, samples.bounded[name], most)
+        for name, film in self.measured.items():
+            film.add(pixels, samples.radiance[name], dropped)
         for start in range(0, pixels.size, CHUNK):
             part = slice(start, start + CHUNK)
             lanes = pixel_span(pixels[part])
@@ -211,6 +221,9 @@ class AovSums(Sums):
 
     def estimate(self, name: str, picture: ExactSums, count: Ints) -> AovEstimate:
         """Return an AOV from its sums, those of the picture, and the samples of each pixel (pixels,)."""
+        if name in self.measured:
+            found = self.measured[name].estimates()
+            return AovEstimate(found.mean, found.standard_error, found.variance)
         shape = self._pixels, aov_of(name).channels
         out = AovEstimate(np.empty(shape, f4), np.empty(shape, f4))
         for part in chunks(self._pixels):

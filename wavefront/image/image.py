@@ -23,7 +23,16 @@ from ..colors import EFFICACY, rgb, to_photometric
 from ..core.errors import SceneError, as_array, number, one_of
 from ..core.html import picture_html
 from ..core.suggestions import Answers, did_you_mean, suggests_keywords
-from ..film.aov_names import AOVS, BOXES, CLAMPED, GIVEN_AOVS, NOISY, is_radiance
+from ..film.aov_names import (
+    AOVS,
+    BOXES,
+    CLAMPED,
+    GIVEN_AOVS,
+    NOISY,
+    STANDARD_ERROR,
+    VARIANCE,
+    is_radiance,
+)
 from ..film.checkpoint import contents_of, is_checkpoint, read_checkpoint
 from ..film.film import Film, batch_size, chunks
 from ..film.light_sums import LightSums
@@ -902,7 +911,11 @@ def _add_aovs(image: Image, sums: PictureSums) -> None:
     for name in sums.layers.names:
         found = sums.layers.estimate(name, sums.film.sums, sums.film.used())
         image.layers[name] = _of_shape(found.mean, width, height)
-        image.errors[name] = _of_shape(found.standard_error, width, height)
+        if found.variance is None:
+            image.errors[name] = _of_shape(found.standard_error, width, height)
+        else:
+            image.layers[name + STANDARD_ERROR] = _of_shape(found.standard_error, width, height)
+            image.layers[name + VARIANCE] = _of_shape(found.variance, width, height)
     if sums.film.light is not None and "indirect" in image.layers:
         _add_light_tracing(image, sums.film.light)
     if CLAMPED in image.layers:

@@ -17,6 +17,7 @@ from numpy.typing import ArrayLike
 from ..arrays.soa import soa
 from ..arrays.state import SoA, SurfaceInteraction
 from ..arrays.vec import Bools, Doubles, Floats, Ints, Lanes, f4
+from ..colors import EFFICACY
 from ..core.errors import SceneError, exact, finite_array
 from ..film.aov_names import DEFAULT_GROUP
 from ..shapes import Shape
@@ -94,6 +95,7 @@ class Light(ABC):
     __slots__ = ()
     shape: Shape | None = None  # the mesh or sphere of the scene whose surface shines; None for no surface
     group: str = DEFAULT_GROUP  # for which layer of radiance the light counts
+    efficacy: float = EFFICACY  # lm/W: what `Measurement.lux` makes of its watts, see docs/luminaires.md
     hint: ClassVar[str | None] = None  # how to turn the light to what it misses, for messages
 
     @abstractmethod

@@ -35,7 +35,7 @@ def with_flux(
     lumens, watts
         Luminous flux, or power as the mean of the channels. The area that emits is in square scene units.
     efficacy
-        lm/W of white, as in `from_photometric`.
+        lm/W of white, as in `from_photometric`. What is given in lumens has it in `Measurement.lux`, too.
 
     Raises
     ------
@@ -59,7 +59,17 @@ def with_flux(
         raise SceneError(f"with_flux: the {type(source).__name__} is dark; give it a color")
     scaled = copy(source)
     setattr(scaled, strength, getattr(source, strength) * (wanted / emitted))
-    return scaled
+    return scaled if watts is not None else _with_efficacy(scaled, efficacy)
+
+
+def _with_efficacy(source: Any, efficacy: float) -> Any:
+    """Return a source that was given lumens with the efficacy that `Measurement.lux` is to take for it."""
+    owner: Any = source if isinstance(source, Light) else source.material
+    if owner.efficacy != efficacy:
+        if owner is not source:
+            owner = source.material = copy(owner)
+        owner.efficacy = efficacy
+    return source
 
 
 def _strength_and_power(source: Any) -> tuple[str, Doubles]:

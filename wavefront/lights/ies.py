@@ -181,7 +181,8 @@ class IESLight(WebLight):
         (0, -1, 0).
     c0
         (3,) direction of the plane C = 0° (or H = 0°), made perpendicular to the former. Seen from above,
-        C = 90° is counterclockwise of it.
+        C = 90° is counterclockwise of it. In files of type A, H grows clockwise, which is the convention of
+        Blender's Cycles; other programs may mirror such files.
     lumens
         Luminous flux in place of that of the file. As an attribute: the flux with all factors, lm.
     dimming
@@ -191,7 +192,7 @@ class IESLight(WebLight):
     tilt
         Degrees from upright, for files with a table of TILT. It does not turn the luminaire.
     efficacy
-        lm/W of white, as in `from_photometric`.
+        lm/W of white, as in `from_photometric`; `Measurement.lux` takes it, too.
     group
         Name of the light group, for `aovs="light_groups"`.
 

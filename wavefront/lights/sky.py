@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 from functools import partial
-from typing import ClassVar, Self
+from typing import Any, ClassVar, Self
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -15,7 +15,8 @@ from ..arrays.soa import soa
 from ..arrays.state import SurfaceInteraction
 from ..arrays.vec import Doubles, Floats, column, dot, f4
 from ..camera import upward
-from ..colors import from_photometric, rgb
+from ..colors import DAYLIGHT, EFFICACY, Photometric, from_photometric, rgb
+from ..colors.photometry import photometric
 from ..core.errors import SceneError, finite_array, number
 from ..core.parameter import Parameter, Parametrized, brief, instance_of, optional, parametrized
 from ..core.suggestions import suggests_keywords
@@ -83,8 +84,20 @@ def _zenith(name: str, up: ArrayLike) -> Doubles:
     return unit(name, upward(name, up))
 
 
+def _horizontal(name: str, value: ArrayLike) -> Floats:
+    return _marked_as(value, rgb(name, value))
+
+
 def _irradiance(name: str, value: ArrayLike) -> Doubles:
-    return rgb(name, value).astype(float).ravel()
+    return _marked_as(value, rgb(name, value).astype(float).ravel())
+
+
+def _marked_as(value: Any, irradiance: Any) -> Any:
+    """Return an irradiance with the efficacy of the value that it was read from, if that has one."""
+    return photometric(irradiance, value.efficacy) if isinstance(value, Photometric) else irradiance
+
+
+_lumens_per_watt = partial(number, holds=lambda x: x > 0, limit="above 0 lm/W")
 
 
 @parametrized
@@ -110,11 +123,16 @@ class Sky(Parametrized, FarLight):
         Irradiance by the sun alone of a surface that faces it, W·m⁻², a color; 0 for no disk.
     ground
         Albedo of the ground, a color.
+    efficacy
+        lm/W, for `Measurement.lux`. None: 683 where the irradiances come from `from_photometric`, and
+        else 110, about that of all watts of sun and sky.
     group
         Name of the light group, for `aovs="light_groups"`.
 
     Attributes
     ----------
+    efficacy
+        lm/W, never None.
     diffuse_horizontal
         (3,) irradiance of a horizontal plane by the sky alone, W·m⁻².
     direct_normal
@@ -131,7 +149,8 @@ class Sky(Parametrized, FarLight):
     Raises
     ------
     SceneError
-        If an argument is malformed, or the sun must be above the horizon and is not.
+        If an argument is malformed, the sun must be above the horizon and is not, or one irradiance is given
+        in lux and the other one in watts.
 
     Examples
     --------
@@ -145,13 +164,36 @@ class Sky(Parametrized, FarLight):
     sun: Parameter[ArrayLike | None] = Parameter(unit, default=None)
     up: Parameter[ArrayLike] = Parameter(_zenith, default="y")
     scale: Parameter[ArrayLike | None] = Parameter(optional(rgb), default=None, kw_only=True)
-    horizontal: Parameter[ArrayLike] = Parameter(rgb, default=1.0, kw_only=True)
+    horizontal: Parameter[ArrayLike] = Parameter(_horizontal, default=1.0, kw_only=True)
     direct_normal: Parameter[ArrayLike] = Parameter(_irradiance, default=0.0, kw_only=True)
     ground: Parameter[ArrayLike] = Parameter(partial(rgb, high=1), default=0.2, kw_only=True)
+    _efficacy: Parameter[float | None] = Parameter(
+        optional(_lumens_per_watt), default=None, kw_only=True, alias="efficacy"
+    )
     group: Parameter[str] = Parameter(group_name, default=DEFAULT_GROUP, kw_only=True)
+
+    @property
+    def efficacy(self) -> float:
+        """lm/W of the watts of sky and sun."""
+        given = [self.direct_normal] if self.scale is not None else [self.horizontal, self.direct_normal]
+        usual = DAYLIGHT if self._efficacy is None else self._efficacy
+        found = {getattr(each, "efficacy", usual) for each in given if each.any()} or {usual}
+        found |= set() if self._efficacy is None else {self._efficacy}
+        if len(found) > 1:
+            raise SceneError(
+                f"Sky horizontal, direct_normal and efficacy have {' and '.join(map(str, sorted(found)))} "
+                "lm/W; give all of its light in watts, or all by from_photometric"
+            )
+        return float(found.pop())
+
+    @efficacy.setter
+    def efficacy(self, value: float | None) -> None:
+        self._efficacy = value
 
     def derive(self) -> None:
         """Set the irradiance of the sky, and the light that is rendered."""
+        _ = self.efficacy  # fails if there are several
+        direct_normal = np.asarray(self.direct_normal)
         rotation = _rotation(self.up)
         relative = _table(self.model, rotation, self.sun)
         level, shade = _level_irradiance(relative), self.scale
@@ -160,9 +202,9 @@ class Sky(Parametrized, FarLight):
                 raise SceneError(
                     f"Sky horizontal is {brief(self.horizontal)}; it and the model's must be above 0"
                 )
-            shade = (self.horizontal / level).astype(f4)
+            shade = (np.asarray(self.horizontal) / level).astype(f4)
         self.diffuse_horizontal = (shade * level).ravel()
-        whole = self.diffuse_horizontal + self.direct_normal * max(float(self.sun @ self.up), 0.0)
+        whole = self.diffuse_horizontal + direct_normal * max(float(self.sun @ self.up), 0.0)
         below = (self.ground * column(whole) / np.pi).astype(f4)
         pixels = np.empty((ROWS, COLUMNS, 3), f4)
         pixels[: ROWS // 2] = np.moveaxis(shade[:, :, None] * relative, 0, -1)
@@ -181,6 +223,7 @@ class Sky(Parametrized, FarLight):
         horizontal: ArrayLike = 1.0,
         direct_normal: ArrayLike = 0.0,
         ground: ArrayLike = 0.2,
+        efficacy: float | None = None,
         group: str = DEFAULT_GROUP,
     ) -> Self:
         """Return a standard general sky of the CIE.
@@ -195,7 +238,7 @@ class Sky(Parametrized, FarLight):
             whose luminance is (1 + 2 sin γ)/3 of that of the zenith at the height γ.
         sun
             (3,) direction to the sun, of any length. Types 1, 3, 5 and 16 do not depend on it.
-        up, horizontal, direct_normal, ground, group
+        up, horizontal, direct_normal, ground, efficacy, group
             As for `Sky`. The standard says nothing of the sun's own light.
 
         Raises
@@ -219,6 +262,7 @@ class Sky(Parametrized, FarLight):
             horizontal=horizontal,
             direct_normal=direct_normal,
             ground=ground,
+            efficacy=efficacy,
             group=group,
         )
 
@@ -235,6 +279,7 @@ class Sky(Parametrized, FarLight):
         extraterrestrial: float = SOLAR_CONSTANT,
         disk: bool = True,
         ground: ArrayLike = 0.2,
+        efficacy: float | None = None,
         group: str = DEFAULT_GROUP,
     ) -> Self:
         """Return the sky of all weathers, from two measured irradiances, as weather files have them.
@@ -254,8 +299,8 @@ class Sky(Parametrized, FarLight):
             Irradiance of the sun outside of the atmosphere, W·m⁻²; over the year it varies by 3.3 %.
         disk
             Whether the sun itself is part of the light.
-        up, ground, group
-            As for `Sky`.
+        up, ground, efficacy, group
+            As for `Sky`: the irradiances have 110 lm/W by default.
 
         Raises
         ------
@@ -288,6 +333,7 @@ class Sky(Parametrized, FarLight):
             horizontal=scaled[1],
             direct_normal=scaled[0] if disk else 0.0,
             ground=ground,
+            efficacy=efficacy,
             group=group,
         )
 
@@ -344,6 +390,7 @@ class Sky(Parametrized, FarLight):
             scale=factor * radiance,
             direct_normal=factor * solar if disk else 0.0,
             ground=albedo if ground is None else ground,
+            efficacy=EFFICACY,
             group=group,
         )
 
@@ -359,7 +406,7 @@ class Sky(Parametrized, FarLight):
         """Return the sky, and the sun in it, as a record of one column."""
         if not self.direct_normal.any():
             return self._light
-        disk = DirectionalLight(-self.sun, self.direct_normal, angle=SUN_DIAMETER).record(center)
+        disk = DirectionalLight(-self.sun, np.asarray(self.direct_normal), angle=SUN_DIAMETER).record(center)
         assert isinstance(disk, InfiniteLight)
         return EnvironmentSum.of([self._light, disk])
 

@@ -11,6 +11,7 @@ import numpy as np
 from ..arrays.vec import f4
 from ..bsdfs import Bsdf
 from ..bsdfs.base import is_bsdf
+from ..colors import EFFICACY
 from ..core.errors import SceneError, number
 from ..core.html import preview_html
 from ..core.parameter import Parameter, Parametrized, flag, instance_of, optional, parametrized
@@ -33,6 +34,7 @@ def _priority(name: str, value: Any) -> int:
     return int(number(name, value, lambda x: x == int(x) and abs(x) < 2**31, "a whole number below 2**31"))
 
 
+_efficacy = partial(number, holds=lambda x: x > 0, limit="above 0 lm/W")
 _cutoff = partial(number, holds=lambda x: x >= 0, limit="at least 0")
 _normal_map = instance_of(BaseNormalMap, "a NormalMap or a BumpMap")
 _interior = instance_of(BaseMedium, "a Medium such as wf.Medium(absorption=1)")
@@ -61,6 +63,8 @@ class Material(Parametrized):
         a texture. A shape's own emission replaces it.
     group
         Name of the light group of the emission, for `aovs="light_groups"`.
+    efficacy
+        lm/W of the emission, for `Measurement.lux`: 683 for watts of visible light.
     interior
         The `Medium` behind the surface. A ray that meets the surface from its back side has crossed it.
     priority
@@ -98,6 +102,7 @@ class Material(Parametrized):
     interior: Parameter[BaseMedium | None] = Parameter(optional(_interior), default=None, kw_only=True)
     priority: Parameter[int | None] = Parameter(optional(_priority), default=None, kw_only=True)
     group: Parameter[str] = Parameter(group_name, default=DEFAULT_GROUP, kw_only=True)
+    efficacy: Parameter[float] = Parameter(_efficacy, default=EFFICACY, kw_only=True)
     name: Parameter[str | None] = Parameter(optional(instance_of(str, "text")), default=None, kw_only=True)
     visible_to_camera: Parameter[bool] = Parameter(flag, default=True, kw_only=True)
 

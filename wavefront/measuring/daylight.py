@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike
 
 from ..arrays.vec import Doubles, f4, luminance
 from ..camera import Sensors
-from ..core.errors import SceneError
+from ..core.errors import SceneError, number
 from ..core.suggestions import suggests_keywords
 from ..io.to_scene import as_scene
 from ..lights import PatchedEnvironment, SkyPatches
@@ -114,8 +114,16 @@ class DaylightCoefficients:
         below = luminance(sky.radiance([-self.patches.axes[:, 2]]).T)
         return np.concatenate([below, above])
 
+    def lux(self, sky: Any) -> tuple[Doubles, Doubles]:
+        """Return the illuminance of each point under a `Sky`, without the sun's disk, and its standard error.
+
+        Both are (n,), lux, by the efficacy of the sky.
+        """
+        value, error = self.irradiance(self.sky_radiance(sky))
+        return value * sky.efficacy, error * sky.efficacy
+
     @suggests_keywords
-    def annual(self, weather: Weather, *, ground: float = 0.2, efficacy: float = 1.0) -> Year:
+    def annual(self, weather: Weather, *, ground: float = 0.2, efficacy: float | None = None) -> Year:
         """Return the light at the points in each hour of a weather file.
 
         The sky of an hour is that of `Sky.perez`. The direct light of the sun comes from where the sun is, by
@@ -128,8 +136,8 @@ class DaylightCoefficients:
         ground
             Albedo of the ground beyond the scene.
         efficacy
-            Factor of all light: with 110, about that of daylight in lm/W, irradiances in W·m⁻² become
-            illuminances in lux.
+            Factor of all light, lm/W: all values are lux then. None: values are in W·m⁻², and the year's
+            `lux` and its limits in lux take the efficacy of the weather.
 
         Raises
         ------
@@ -138,12 +146,13 @@ class DaylightCoefficients:
         """
         sky, sun = weather.on_patches(self.patches, ground, ALONG)
         scattered = self.batches - self.direct
-        beam = self.sunlight(weather) * efficacy
+        factor = 1.0 if efficacy is None else number("efficacy", efficacy, lambda x: x > 0, "above 0 lm/W")
+        beam = self.sunlight(weather) * factor
         each = [
-            product(whole, sky * efficacy) + product(part, sun * efficacy) + beam
+            product(whole, sky * factor) + product(part, sun * factor) + beam
             for whole, part in zip(self.batches, scattered, strict=True)
         ]
-        return Year(np.stack(each).astype(f4), weather)
+        return Year(np.stack(each).astype(f4), weather, weather.efficacy if efficacy is None else 1.0)
 
     def sunlight(self, weather: Weather) -> Doubles:
         """Return the irradiance (n, hours) of each point by the sun alone, W·m⁻², where nothing hides it."""

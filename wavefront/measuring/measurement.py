@@ -3,20 +3,25 @@
 from __future__ import annotations
 
 import os
+from functools import cached_property
 from typing import Any, Self
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ..arrays.vec import Doubles
-from ..core.errors import SaveError, SceneError
+from ..core.errors import SaveError, SceneError, one_of
 from ..core.files import check_target, write_bytes
 from ..core.plural import plural
 from ..core.suggestions import Answers, suggests_keywords
+from ..film.aov_names import LUX, STANDARD_ERROR, VARIANCE
 from ..image import Image
 from ..statistics import RegionMean
+from .units import PHOTOMETRIC
 
 COLORS = ("r", "g", "b")
+PLACES = ("position", "normal", "scale")  # layers that belong to the sensors
+KINDS_OF_LIGHT = ("broadband", "visible")
 
 
 class Measurement(Answers):
@@ -33,6 +38,8 @@ class Measurement(Answers):
         (n, 3) mean of each channel: W·m⁻² (irradiance, fluence), W·sr⁻¹·m⁻² (radiance) or W (flux).
     standard_error
         (n, 3) of `value`; NaN for fewer than two samples.
+    lux, lux_error
+        (n,) the photometric light, and its standard error.
     samples
         (n,) of each point.
     points, normals
@@ -57,6 +64,8 @@ class Measurement(Answers):
     (True, 'fluence')
     >>> np.allclose(found.value, 2 * np.pi, rtol=0.02)
     True
+    >>> np.allclose(found.lux, 683 * 2 * np.pi, rtol=0.02)
+    True
     """
 
     def __init__(self, image: Image) -> None:
@@ -77,9 +86,13 @@ class Measurement(Answers):
         return f"<Measurement: {self}>"
 
     def __str__(self) -> str:
-        """Return what was measured, at how many points, and the largest relative error."""
+        """Return what was measured, at how many points, the largest relative error, and how much it is."""
         places = plural(self._count, "point")
-        return f"{self.kind} at {places}, estimated error {self.metadata['noise']:.2%} at most"
+        known = f"{self.kind} at {places}, estimated error {self.metadata['noise']:.2%} at most"
+        if LUX not in self.image.layers:
+            return known
+        least, most = (f"{x:.0f}" if x >= 1e3 else f"{x:.3g}" for x in (self.lux.min(), self.lux.max()))
+        return f"{known}, {least} to {most} {PHOTOMETRIC[self.kind][1]}"
 
     def _rows(self, values: Any) -> NDArray[Any]:
         """Return the values of pixels (rows, columns, ...) as those of the points (n, ...)."""
@@ -154,15 +167,74 @@ class Measurement(Answers):
         """
         return Measurement(self.image.merge(other.image))
 
+    @property
+    def lux(self) -> NDArray[np.float32]:
+        """(n,) the photometric light: each light by its own efficacy (docs/measuring.md).
+
+        Lux of irradiance and fluence, cd·m⁻² of radiance, lumens of flux.
+        """
+        return self._photometric.value[:, 0]
+
+    @property
+    def lux_error(self) -> NDArray[np.float32]:
+        """(n,) standard error of `lux`; NaN for fewer than two samples."""
+        return self._photometric.standard_error[:, 0]
+
+    def lux_interval(self, confidence: float = 0.95) -> tuple[Doubles, Doubles]:
+        """Return the confidence interval of each `lux`, as `interval`: lower and upper limits, (n,) each."""
+        low, high = self._photometric.interval(confidence)
+        return low[:, 0], high[:, 0]
+
+    def lux_of(self, kind: str) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
+        """Return the part of `lux` by one kind of light, and its standard error, (n,) each.
+
+        Parameters
+        ----------
+        kind
+            "broadband": lights whose watts are those of a whole spectrum, with less than 179 lm/W, such as a
+            sky in W·m⁻²; "visible": all others.
+
+        Raises
+        ------
+        SceneError
+            If there is no such kind.
+        """
+        column = 1 + KINDS_OF_LIGHT.index(one_of("kind", kind, KINDS_OF_LIGHT))
+        found = self._photometric
+        return found.value[:, column], found.standard_error[:, column]
+
+    @cached_property
+    def _photometric(self) -> Measurement:
+        """The measurement whose channels are `lux`, and its parts by the kinds of light."""
+        image = self.image
+        if LUX not in image.layers:
+            raise SceneError("lux is not known: the file was made before measurements kept it")
+        layers = {name: image.layers[name] for name in PLACES if name in image.layers}
+        return Measurement(
+            Image(
+                image.layers[LUX],
+                image.spp,
+                image.metadata,
+                counts=image.counts,
+                variance=image.layers[LUX + VARIANCE],
+                standard_error=image.layers[LUX + STANDARD_ERROR],
+                layers=layers,
+            )
+        )
+
     def columns(self) -> dict[str, NDArray[Any]]:
         """Return arrays (n,) by name, as tables have them: `pandas.DataFrame(found.columns())`.
 
-        They are x, y, z, nx, ny, nz, r, g, b, the standard errors r_error, g_error, b_error, and samples;
-        for parts that were measured also "direct.r" and so on.
+        They are x, y, z, nx, ny, nz, r, g, b, the standard errors r_error, g_error, b_error, lux, lux_error,
+        and samples; for parts that were measured also "direct.r" and so on. Of radiance `lux` is called
+        luminance, of flux lumens.
         """
         axes = ("x", "y", "z")
         tables = [(axes, self.points), (tuple(f"n{each}" for each in axes), self.normals)]
         tables += [(COLORS, self.value), (tuple(f"{each}_error" for each in COLORS), self.standard_error)]
+        if LUX in self.image.layers:
+            name = PHOTOMETRIC[self.kind][0]
+            tables.append(((name, f"{name}_error"), np.stack([self.lux, self.lux_error], 1)))
         for name in self.image.errors:
             value, error = self.part(name)
             tables.append((tuple(f"{name}.{each}" for each in COLORS), value))
@@ -212,8 +284,10 @@ class Measurement(Answers):
             raise SceneError(f"{os.fspath(path)}: {error}") from None
 
     @suggests_keywords
-    def plot(self, levels: int = 8, axes: Any = None, label: str | None = None) -> Any:
-        """Plot the luminance of the values with matplotlib: false color and isolines over a plane of points.
+    def plot(
+        self, levels: int = 8, axes: Any = None, label: str | None = None, *, unit: str = "watts"
+    ) -> Any:
+        """Plot the values with matplotlib: false color and isolines over a plane of points.
 
         Parameters
         ----------
@@ -223,6 +297,8 @@ class Measurement(Answers):
             Axes of matplotlib to draw into; by default those of a new figure.
         label
             What the scale of colors says; by default what is measured, and its unit.
+        unit
+            "watts" for the luminance of the values, 0.2126 R + 0.7152 G + 0.0722 B; "lux" for `lux`.
 
         Returns
         -------
@@ -232,13 +308,13 @@ class Measurement(Answers):
         Raises
         ------
         SceneError
-            If the points are on one line.
+            If the points are on one line, or the unit is unknown.
         ImportError
             If matplotlib is not installed. The message says how to install it.
         """
         from .plot import draw
 
-        return draw(self, levels, axes, label)
+        return draw(self, levels, axes, label, unit)
 
 
 def file_kind(path: str | os.PathLike[str]) -> str:

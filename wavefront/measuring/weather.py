@@ -10,7 +10,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..arrays.vec import Doubles, f4
-from ..core.errors import SceneError, exact, finite_array
+from ..colors import DAYLIGHT
+from ..core.errors import SceneError, exact, finite_array, number
 from ..core.files import decode_text, read_bytes
 from ..core.suggestions import suggests_keywords
 from ..lights import SkyPatches
@@ -34,11 +35,13 @@ class Weather:
         (h,) irradiance of a horizontal plane by the sky, W·m⁻².
     sun
         (h, 3) directions to the sun, of any length.
+    efficacy
+        lm/W of both, for lux: about 110, of all watts of sun and sky.
 
     Raises
     ------
     SceneError
-        If an array is malformed, or an irradiance is negative.
+        If an array is malformed, an irradiance is negative, or the efficacy is not above 0.
 
     Examples
     --------
@@ -47,7 +50,15 @@ class Weather:
     3
     """
 
-    def __init__(self, direct_normal: ArrayLike, diffuse_horizontal: ArrayLike, sun: ArrayLike) -> None:
+    def __init__(
+        self,
+        direct_normal: ArrayLike,
+        diffuse_horizontal: ArrayLike,
+        sun: ArrayLike,
+        *,
+        efficacy: float = DAYLIGHT,
+    ) -> None:
+        self.efficacy = number("Weather efficacy", efficacy, lambda x: x > 0, "above 0 lm/W")
         self.direct_normal = finite_array("direct_normal", direct_normal, (None,))
         shape = self.direct_normal.shape
         self.diffuse_horizontal = finite_array("diffuse_horizontal", diffuse_horizontal, shape)

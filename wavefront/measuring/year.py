@@ -7,7 +7,7 @@ from collections.abc import Callable
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..arrays.vec import Doubles, Floats
+from ..arrays.vec import Bools, Doubles, Floats
 from ..core.errors import SceneError, number
 from ..core.suggestions import suggests_keywords
 from .weather import Weather
@@ -27,21 +27,26 @@ class Year:
         (b, n, h) irradiance, or illuminance, of n points in h hours, by b independent parts of the samples.
     weather
         The suns and irradiances of the hours.
+    efficacy
+        Lux for each unit of `batches`: 1 if they are illuminances.
 
     Examples
     --------
     >>> hours = wf.Weather([300, 600], [100, 120], sun=[(0.5, 0.5, 1), (0, 1, 1)])
     >>> found = wf.daylight_coefficients([wf.Sphere((0, 0, 9), 1)], [(0, 0, 0)], (0, 1, 0), spp=64)
-    >>> year = found.annual(hours, efficacy=110)
+    >>> year = found.annual(hours)
     >>> isinstance(year, wf.Year), year.value.shape
     (True, (1, 2))
+    >>> np.allclose(year.lux, 110 * year.value)
+    True
     >>> share, error = year.daylight_autonomy(60_000)
     >>> share.tolist()
     [0.5]
     """
 
-    def __init__(self, batches: Floats, weather: Weather) -> None:
+    def __init__(self, batches: Floats, weather: Weather, efficacy: float = 1.0) -> None:
         self.batches, self.weather = batches, weather
+        self.efficacy = number("Year efficacy", efficacy, lambda x: x > 0, "above 0")
 
     @property
     def value(self) -> Doubles:
@@ -54,9 +59,19 @@ class Year:
         spread = self.batches.std(0, ddof=1, dtype=float)
         return np.asarray(spread / np.sqrt(len(self.batches)))
 
+    @property
+    def lux(self) -> Doubles:
+        """(n, h) illuminance."""
+        return np.asarray(self.value * self.efficacy)
+
+    @property
+    def lux_error(self) -> Doubles:
+        """(n, h) standard error of `lux`."""
+        return np.asarray(self.standard_error * self.efficacy)
+
     @suggests_keywords
     def total(self, hours: ArrayLike | None = None) -> tuple[Doubles, Doubles]:
-        """Return the sum over the hours, such as W·h·m⁻², and its standard error, (n,) each.
+        """Return the sum of `value` over the hours, such as W·h·m⁻², and its standard error, (n,) each.
 
         Parameters
         ----------
@@ -72,12 +87,12 @@ class Year:
         Parameters
         ----------
         least
-            Such as 300 lux.
+            Lux, such as 300.
         hours
             Those in which the room is used, as for `total`.
         """
         limit = number("least", least)
-        return self._estimate(lambda light: (light >= limit).mean(1), hours)
+        return self._estimate(lambda light: (light * self.efficacy >= limit).mean(1), hours)
 
     @suggests_keywords
     def useful_daylight(
@@ -95,7 +110,11 @@ class Year:
             As for `total`.
         """
         least, most = number("low", low), number("high", high, lambda x: x >= low, f"at least low, {low}")
-        return self._estimate(lambda light: ((light >= least) & (light <= most)).mean(1), hours)
+        return self._estimate(lambda light: self._between(light, least, most).mean(1), hours)
+
+    def _between(self, light: Doubles, least: float, most: float) -> Bools:
+        lux = light * self.efficacy
+        return np.asarray((lux >= least) & (lux <= most))
 
     def _estimate(
         self, figure: Callable[[Doubles], Doubles], hours: ArrayLike | None

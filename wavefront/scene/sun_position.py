@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from datetime import UTC
 from typing import Any
 
 import numpy as np
@@ -10,7 +11,7 @@ from numpy.typing import ArrayLike
 from ..arrays.elementary import sin_cos_turns
 from ..arrays.vec import Doubles
 from ..camera import upward
-from ..core.errors import SceneError, finite_array, number
+from ..core.errors import SceneError, finite_array, number, warn_caller
 from ..core.suggestions import suggests_keywords
 from .scene import turned_up
 
@@ -31,7 +32,7 @@ def sun_position(
     ----------
     time
         A time with its zone, such as "2026-06-21 12:00+02:00", a `datetime`, or several (n,), as pandas reads
-        them. Without a zone it is UTC.
+        them. One without a zone is taken for UTC, with a warning: most clocks show another time.
     latitude
         Degrees, north positive.
     longitude
@@ -63,7 +64,7 @@ def sun_position(
 
     Examples
     --------
-    >>> wf.sun_position("2026-06-21 12:00", latitude=48.1, longitude=11.6).round(2)
+    >>> wf.sun_position("2026-06-21 14:00+02:00", latitude=48.1, longitude=11.6).round(2)
     array([-0.18,  0.9 ,  0.4 ])
     """
     place = (
@@ -81,6 +82,11 @@ def sun_position(
         times = pandas.DatetimeIndex(np.atleast_1d(np.asarray(time, dtype=object)))
     except (TypeError, ValueError) as error:
         raise SceneError(f"time is {time!r}; it must be a time, or several: {error}") from error
+    if getattr(times, "tz", UTC) is None:
+        warn_caller(
+            f"sun_position: the time {times[0]} has no zone and is taken for UTC; write {times[0]}+00:00 if "
+            "it is, or the zone of the place, such as +02:00"
+        )
     found = get_solarposition(times, *place)
     (high, level), (across, along) = (
         sin_cos_turns(found[name].to_numpy() / 360) for name in ("apparent_elevation", "azimuth")

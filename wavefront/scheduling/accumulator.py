@@ -86,7 +86,9 @@ class Accumulator:
             self._add_splats(self.film.light, wave, result.splats)
         if self.sums.layers is not None:
             assert result.layers is not None
-            self.sums.layers.add(wave.pixels, result.layers, result.radiance, most=wave.end)
+            self.sums.layers.add(
+                wave.pixels, result.layers, result.radiance, most=wave.end, dropped=result.bad
+            )
         self.bad.count_in(wave, result)
         self.rays += result.rays
 

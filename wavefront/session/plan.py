@@ -7,6 +7,7 @@ from dataclasses import replace
 from ..arrays.soa import soa
 from ..camera import Camera
 from ..core.progress import phase
+from ..film.aov_names import LUX
 from ..guiding import GuideTable
 from ..integrators import INTEGRATORS
 from ..integrators.tuning import JobsRunner
@@ -64,7 +65,7 @@ def make_plan(settings: Settings, scene: PreparedScene, camera: Camera, table: G
         FILTERS.find(settings.values["filter"]),
         INTEGRATORS.find(settings.values["integrator"]),
         settings.values["max_bounces"],
-        settings.sampled_aovs,
+        (*settings.sampled_aovs, *((LUX,) if camera.sensor is not None else ())),
         table,
         settings.values["clamp"],
     )
