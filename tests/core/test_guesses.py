@@ -167,7 +167,7 @@ GUESSES = [
     ("COMPARISON.significant", "comparison.p_value < 0.01"),
     ("COMPARISON.passed", "comparison.p_value < 0.01"),
     ("COMPARISON.ssim", "comparison.flip"),
-    ("MEASURED.lux", "wf.to_photometric(measurement.value)"),
+    ("MEASURED.illuminance", "lux"),
     ("wf.Material.named('wood')", 'wf.Diffuse(wf.Texture("wood.png"))'),
     ("wf.Diffuse(0.5, alpha=0.3)", "wf.Material(bsdf, alpha=...)"),
     ("wf.Camera(eye=(0, 0, 5))", "wf.Camera.look_at(origin, target, up"),

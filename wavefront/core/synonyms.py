@@ -233,8 +233,8 @@ SYNONYMS: dict[str, tuple[str, ...]] = {
     "comparison.significant": _DECIDED,
     "comparison.ssim": ("comparison.flip, comparison.psnr or comparison.relative_mse",),
     "comparison.mse": ("comparison.rmse ** 2, or relative_mse",),
-    "measurement.illuminance": ("wf.to_photometric(measurement.value)",),
-    "measurement.luminance": ("wf.to_photometric(measurement.value)",),
+    "measurement.illuminance": ("lux",),
+    "measurement.luminance": ("lux",),
     "measurement.mean": ("value",),
     # things of the package, and choices
     "wavefront.arealight": ("Rectangle",),
