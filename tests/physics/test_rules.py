@@ -81,7 +81,7 @@ HIDDEN: dict[str, Callable[[], list[wf.Shape]]] = {
         cube(wf.Diffuse(0.5)),
         cube(wf.Diffuse(0.5), CENTER + np.array((0.1, 0, 0))),
     ],
-    "a medium that absorbs": lambda: inside(wf.Medium(1e-3)),
+    "a medium that absorbs": lambda: [cube(wf.Material(wf.Dielectric(1.5), interior=wf.Medium(1e-3)))],
     "a medium that scatters": lambda: inside(wf.Medium(0, 1e-3)),
     "a medium that glows": lambda: inside(wf.Medium(0, 0, emission=1e-3)),
     "a grid": lambda: inside(
@@ -117,19 +117,36 @@ def test_what_no_ray_meets_changes_no_bit(hidden: str) -> None:
         np.testing.assert_array_equal(plain, other)
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize("hidden", HIDDEN)
-@pytest.mark.parametrize("setting", ["reuse", "caustics"])
-def test_what_no_ray_meets_changes_no_bit_of_shared_and_light_paths(
+NOW = {("reuse", "an alpha"), ("reuse", "a texture"), ("caustics", "a delta lobe")}
+REFUSED = {"a medium that scatters", "a medium that glows", "a grid", "a priority"}  # by both
+# points seen at a grazing angle are not shared then: another estimate of the same mean
+OTHERWISE = {("reuse", "interpolated normals")}
+
+
+@pytest.mark.parametrize(
+    ("setting", "hidden"),
+    [
+        pytest.param(*pair, marks=() if pair in NOW else pytest.mark.slow)
+        for pair in itertools.product(("reuse", "caustics"), HIDDEN)
+        if pair[1] not in REFUSED and pair not in OTHERWISE
+    ],
+)
+def test_what_no_ray_meets_changes_no_bit_of_paths_that_are_shared_or_come_from_lights(
     setting: str, hidden: str, close_tiles: None
 ) -> None:
-    if hidden in ("interpolated normals", "instances") and setting == "reuse":
-        return  # points seen at a grazing angle are not shared then: another estimate of the same mean
-    shapes = HIDDEN[hidden]()
-    if compiled(around_a_box(shapes)).media is not None:
-        pytest.skip("refused")
-    plain, other = (render(around_a_box(each), 2, branches=1, **{setting: True}).rgb for each in ([], shapes))
-    np.testing.assert_allclose(plain, other, rtol=1e-4 if hidden == "instances" else 0)
+    options = {"branches": 1, "max_bounces": 4, setting: True}
+    plain, other = (render(around_a_box(shapes), 1, **options).rgb for shapes in ([], HIDDEN[hidden]()))
+    np.testing.assert_allclose(plain, other, rtol=1e-4 if hidden == "instances" else 1e-6)
+
+
+def test_first_points_that_are_not_all_lambertian(close_tiles: None) -> None:
+    """Where all are, their BSDF is an albedo; a black one that is another model is as black."""
+    pictures = []
+    for black in (wf.Diffuse(0.0), wf.OrenNayar(0.0)):
+        scene = around_a_box([wf.Rectangle((-2, 0, 2.01), (0.4, 0, 0), (0, 0.4, 0), material=black)])
+        pictures.append(render(scene, 1, branches=1, max_bounces=4, reuse=True).rgb)
+    np.testing.assert_allclose(*pictures, rtol=1e-4)
+    assert (pictures[0] > 0).mean() > 0.9
 
 
 # --- Triangles, instances and sizes -------------------------------------------------------------------
@@ -424,3 +441,15 @@ def test_one_triangle_more_than_are_sampled_for_surfaces(count: int) -> None:
     assert compiled(scene).lights.kinds[0].few == (count == FEW)
     expected = polygon_irradiance([(-1, 1, -1), (1, 1, -1), (0, 1, 1)]) * ALBEDO / np.pi
     assert_mean(measure(scene, 256, max_bounces=1), expected, 0.01)
+
+
+@pytest.mark.parametrize("glow", [0.0, 1e-6])
+def test_media_of_both_kinds_beside_each_other(glow: float) -> None:
+    """Grids take numbers without end, and light samples of grids that glow end within them."""
+    slab = wf.Box((0, 0.75, 0), (4, 0.5, 4), material=wf.Material(wf.NullSurface(), interior=wf.Medium(0.5)))
+    grid = wf.GridMedium(np.ones((2, 2, 2)), [(-2, 1.2, -2), (2, 1.6, 2)], absorption=1)
+    fire = wf.GridMedium(np.ones((2, 2, 2)), [(3, 0.5, 0), (4, 1.5, 1)], absorption=1, emission=glow)
+    shapes = [floor(), slab, wf.GridBox(grid), wf.GridBox(fire)]
+    scene = wf.Scene(shapes, wf.PointLight((0, 2, 0), 10), probe(HERE, (0.31, 0.17, 0.23)))
+    expected = 2.5 * ALBEDO / np.pi * np.exp(-0.5 * 0.5 - 0.4)
+    assert_mean(measure(scene, 64, max_bounces=1), expected, 0.01, rounding=1e-4)
