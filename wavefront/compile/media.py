@@ -20,6 +20,7 @@ from ..media.grid import GridMedia
 from ..media.phase import deflected
 from ..shapes import Shape
 from ..textures.base import BaseTexture
+from .touching import TouchingFaces
 
 DEPTH = 4  # media that a path remembers, the last one that it entered first
 NEAR = 1e-6  # part of a box that may overlap another one by rounding
@@ -85,11 +86,17 @@ class MediaTable:
     glows: bool  # any does
     light_of: Ints  # (media,) number of the light that samples its emission, -1 for none
     bounds: Doubles  # (2, 3) corners of all that encloses anything, relative to the scene's center
+    touching: TouchingFaces | None = None  # None where no shapes that enclose anything lie on each other
 
     @property
     def takes_steps(self) -> bool:
         """Whether a record needs numbers without end."""
         return any(record.takes_steps for record in self.records)
+
+    @property
+    def only_absorbs(self) -> bool:
+        """Whether no random numbers are needed: nothing scatters or glows, or takes steps."""
+        return not (self.scatters.any() or self.glows or self.takes_steps)
 
     def highest(self, stack: NDArray[Any]) -> NDArray[Any]:
         """Return what there is inside of stacks (k, n): the entries (n,) of the highest priority."""
@@ -140,7 +147,11 @@ class MediaTable:
 
 
 def crossed(stack: NDArray[Any], crossing: NDArray[Any]) -> NDArray[Any]:
-    """Return stacks (4, n) after `MediaTable.crossing` (n,)."""
+    """Return stacks (4, n) after `MediaTable.crossing` (n,), or after several, (k, n)."""
+    if crossing.ndim == 2:
+        for each in crossing:
+            stack = crossed(stack, each)
+        return stack
     if not crossing.any():
         return stack
     enters = crossing > 0
@@ -161,7 +172,7 @@ def without(stack: NDArray[Any], entry: NDArray[Any]) -> NDArray[Any]:
     return out
 
 
-def media_of(materials: Sequence[Material], around: BaseMedium | None) -> list[BaseMedium]:
+def media_of(materials: Sequence[Material], around: BaseMedium | None, alone: bool) -> list[BaseMedium]:
     """Return the distinct media that need a `MediaTable`; none where absorption behind surfaces is all.
 
     Parameters
@@ -170,10 +181,13 @@ def media_of(materials: Sequence[Material], around: BaseMedium | None) -> list[B
         Those of the scene.
     around
         The medium of the scene.
+    alone
+        Whether each absorber is alone (compile/absorption.py).
     """
     inside = [material.interior for material in materials if material.interior is not None]
     needed = around is not None or any(material.priority is not None for material in materials)
-    if not needed and not any(each.scatters or each.glows or each.bounds is not None for each in inside):
+    varied = any(each.scatters or each.glows or each.bounds is not None for each in inside)
+    if alone and not needed and not varied:
         return []
     return list({id(medium): medium for medium in [*inside, *([] if around is None else [around])]}.values())
 

@@ -15,6 +15,7 @@ from ..lights.choice import LightSamplerMaker
 from ..scene import Scene
 from ..shapes import Shape
 from ..shapes.attributes import Corners, corner_values
+from .absorption import absorbs_alone
 from .curved import CurvedTable
 from .geometry import compute_corner_normals, gather_triangles, same_as_next
 from .instances import InstanceTable, own_frame, place_instances, sort_shapes
@@ -38,6 +39,7 @@ from .morton import MortonGrid
 from .scale import check_distance, check_lights, length_factor, scaled_shapes
 from .shape_numbers import ShapeNumbers, number_shapes
 from .specular_surfaces import SpecularSurfaces, find_specular_surfaces
+from .touching import find_touching
 
 ROULETTE_AFTER = 2  # scattering events, by default
 LARGE = 20_000  # triangles; from here on the order of rays matters more than sorting them costs
@@ -82,7 +84,7 @@ class CompiledScene:
     backdrop: InfiniteLight | None = None  # what they show of the environment; None for all of its light
     roulette_after: float = ROULETTE_AFTER  # scattering events before Russian roulette may end paths
     specular_surfaces: SpecularSurfaces | None = None  # for light tracing; None without it
-    media: MediaTable | None = None  # None where media only absorb, each behind its own surfaces
+    media: MediaTable | None = None  # None where none are, or each absorbs alone (absorption.py)
 
     @property
     def interpolates(self) -> bool:
@@ -156,7 +158,7 @@ def compile_scene(
     triangles, normals = gather_triangles(meshes, vertices)
     user_materials, material_of, replaced = number_materials(meshes, curved, instances)
     around = None if scene.medium is None else scene.medium.scaled(scale)
-    filled = media_of(user_materials, around)
+    filled = media_of(user_materials, around, absorbs_alone(placed, scene.lights, scale))
     media = media_table(around, placed, user_materials, filled, center)
     glowing, of_media = glow_lights(media)
     phases = phase_materials(filled)
@@ -195,6 +197,8 @@ def compile_scene(
     groups, efficacies = numbered.groups(), numbered.efficacies()
     absorption = absorption_table(user_materials) if media is None else None
     if media is not None:
+        holds = (media.entry_of > 0).take(material_of[:once])
+        media.touching = find_touching(triangles[:once], shape_of, material_of[:once], holds)
         # events in media have the numbers from -2 down, so their entries are those before that of a miss
         rows = np.arange(len(user_materials) - len(phases), len(user_materials))
         material_of = np.concatenate([material_of, rows[::-1], [0]])

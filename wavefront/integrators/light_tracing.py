@@ -20,6 +20,7 @@ with Direct Computation of Pixel Intensities, 1993.
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 
@@ -27,6 +28,7 @@ from ..arrays.soa import soa
 from ..arrays.state import Hits, Paths, Rays, SoA, SurfaceInteraction, Words
 from ..arrays.vec import Bools, Doubles, Floats, Ints, broadcast, dot, f4, highest, length, take
 from ..camera import Camera
+from ..compile.media import ENTRY, crossed
 from ..compile.scene import CompiledScene
 from ..compile.specular_surfaces import SpecularPoints, SpecularSurfaces
 from ..lights import LightSample
@@ -34,9 +36,10 @@ from ..sampling.sampler import Dimension, Sampler
 from ..stages.alpha import alpha_pass_through
 from ..stages.bounce import bounce_sample
 from ..stages.compact import compact, roulette, select
+from ..stages.inside import stacks_at
 from ..stages.interaction import interaction, material_rows, offset_origin, origin_above
 from ..stages.intersect import ShadowRays, intersect, shadow_rays, visible
-from ..stages.medium import absorb
+from ..stages.medium import absorb, hidden
 from ..stages.normal_mapping import perturb_normals
 from ..stages.shade import Shading, evaluate, radiance_at_samples, shading
 from ..stages.transmittance import transmittance_along
@@ -76,7 +79,7 @@ def trace_light(
     paths, hits, flux = _begin(scene, scene.specular_surfaces, camera, sampler, pixel, sample)
     found = []
     for bounce in range(max_bounces - 1):
-        shade = _prepared(scene, paths, hits)
+        shade = _prepared(scene, paths, hits, paths.media)
         if bounce:
             found.append(_connect(scene, camera, sampler, paths, hits, shade, flux, bounce))
         paths = _scatter(scene, paths, hits, shade, sampler, bounce)
@@ -91,7 +94,7 @@ def trace_light(
         if not len(paths):
             break
     else:
-        shade = _prepared(scene, paths, hits)
+        shade = _prepared(scene, paths, hits, paths.media)
         found.append(_connect(scene, camera, sampler, paths, hits, shade, flux, max_bounces - 1))
     return Splats.concatenate([_nothing(), *found])
 
@@ -167,15 +170,17 @@ def _lit(
     """Return the paths that nothing blocks on the way from the light, and the flux (3, slots) of each."""
     surface = interaction(scene, paths, hits)
     light, number = light.take(paths.slot), number.take(paths.slot)
-    everything = np.arange(len(surface))
-    rays = shadow_rays(surface, origin_above(surface), light, everything)
+    everything, start = np.arange(len(surface)), origin_above(surface)
+    rays = shadow_rays(surface, start, light, everything)
+    rays.media = paths.media = stacks_at(scene, start)
     arriving = radiance_at_samples(scene, rays, light, everything, number)
     arriving = arriving * _transmittance(scene, rays)
     cos = dot(surface.ng, light.wi)
     flux = np.zeros((3, slots), f4)
     arriving = arriving * (cos * f4(specular.area) / light.pdf)
     flux[:, paths.slot] = arriving if scene.opacities is None else arriving * scene.opacities.at(surface)
-    lanes = np.flatnonzero(highest(take(flux, paths.slot)) != 0)
+    lit = (highest(take(flux, paths.slot)) != 0) & ~hidden(scene, paths.media, surface.material)
+    lanes = np.flatnonzero(lit)
     lanes = lanes.compress(_first(scene, specular, rays.take(lanes)))
     return paths.take(lanes), hits.take(lanes), flux
 
@@ -195,14 +200,16 @@ def _transmittance(scene: CompiledScene, rays: ShadowRays, absent: Bools | None 
 
     `absent` says which materials (materials,) are not there for them.
     """
-    if scene.opacities is not None or absent is not None:
+    if scene.opacities is not None or scene.media is not None or absent is not None:
         return transmittance_along(scene, rays, absent)
     return visible(scene, rays).astype(f4)
 
 
-def _prepared(scene: CompiledScene, rays: Rays, hits: Hits) -> Shading:
-    """Return the surfaces that rays hit, ready to shade."""
+def _prepared(scene: CompiledScene, rays: Rays, hits: Hits, stack: Any) -> Shading:
+    """Return the surfaces that rays with stacks (4, n) hit, ready to shade."""
     surface = interaction(scene, rays, hits)
+    if scene.media is not None:
+        surface.index_around = scene.media.index_around(stack, surface)
     perturb_normals(scene, surface)
     return shading(scene, surface)
 
@@ -230,7 +237,9 @@ def _scatter(
     rough = np.flatnonzero(~left.specular)
     if rough.size:
         wo = take(left.direction, rough)
-        weight = _towards(scene, hits.take(rough), surface.point.take(rough, 1), wo, take(surface.wo, rough))
+        stack = _around(shade, paths, rough, wo)
+        point, wi = surface.point.take(rough, 1), take(surface.wo, rough)
+        weight = _towards(scene, hits.take(rough), point, wo, wi, stack)
         pdf = take(left.pdf, rough)
         throughput[:, rough] = take(paths.throughput, rough) * np.where(
             pdf > 0, weight / np.where(pdf > 0, pdf, 1), 0
@@ -256,14 +265,23 @@ def _divided(a: Floats, b: Floats) -> Floats:
     return np.where(b > 0, a / np.where(b > 0, b, f4(1)), f4(0))
 
 
-def _towards(scene: CompiledScene, hits: Hits, point: Floats, wo: Floats, wi: Floats) -> Floats:
+def _around(shade: Shading, paths: Paths, lanes: Ints, wo: Floats) -> Any:
+    """Return the stacks (4, k) of light that leaves some lanes along wo (3, k); None where there are none."""
+    if paths.media is None:
+        return None
+    below = dot(take(shade.surface.ng, lanes), wo) < 0
+    return crossed(take(paths.media, lanes), np.where(below, take(shade.crossing, lanes), ENTRY(0)))
+
+
+def _towards(scene: CompiledScene, hits: Hits, point: Floats, wo: Floats, wi: Floats, stack: Any) -> Floats:
     """Return f times two cosines (3, k), given light that comes from wi (3, k) and leaves along wo (3, k).
 
-    They are the cosine of wo with the geometric normal, and that of wi with the shading normal over that with
-    the geometric one, as the flux that arrives has the latter.
+    `stack` (4, k) has what is around where it leaves. The cosines are that of wo with the geometric normal,
+    and that of wi with the shading normal over that with the geometric one, as the flux that arrives has the
+    latter.
     """
     rays = Rays(point, -wo, broadcast(np.intp(-1), wo.shape[1]))
-    shade = _prepared(scene, rays, replace(hits, t=np.zeros_like(hits.t)))
+    shade = _prepared(scene, rays, replace(hits, t=np.zeros_like(hits.t)), stack)
     local = shade.frame.to_local(wi)
     cos, cos_g = shade.cosines(local, wi)
     f, _ = evaluate(shade, local)
@@ -292,8 +310,9 @@ def _connect(
     wo = to_eye / distance
     seen = surface.take(lanes)
     arriving = take(flux, paths.slot.take(lanes)) * take(paths.throughput, lanes)
-    weight = _towards(scene, hits.take(lanes), seen.point, wo, seen.wo) * importance.take(lanes).astype(f4)
-    radiance = arriving * weight
+    stack = _around(shade, paths, lanes, wo)
+    weight = _towards(scene, hits.take(lanes), seen.point, wo, seen.wo, stack)
+    radiance = arriving * (weight * importance.take(lanes).astype(f4))
     lit = np.flatnonzero(highest(radiance) != 0)
     seen, wo = seen.take(lit), take(wo, lit)
     rays = ShadowRays(
@@ -303,6 +322,7 @@ def _connect(
         error=seen.error,
         distance=distance.take(lit),
         cos_light=broadcast(f4(1), lit.size),
+        media=None if stack is None else take(stack, lit),
     )
     radiance = take(radiance, lit) * _transmittance(scene, rays, scene.unseen)
     if scene.absorption is not None:

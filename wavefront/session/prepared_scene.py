@@ -75,7 +75,8 @@ class PreparedScene:
                 mis=INTEGRATORS.find(settings.values["integrator"]) in WITH_MIS,
                 caustics=settings.values["caustics"],
             )
-        check_combinations({**values, MEDIA: compiled.media is not None})
+        media = compiled.media
+        check_combinations({**values, MEDIA: media is not None and not media.only_absorbs})
         self.compiled = replace(
             compiled, background=settings.background_color, roulette_after=settings.roulette_after
         )

@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 import time
 from collections.abc import Callable, Sequence
-from dataclasses import fields
+from dataclasses import fields, replace
 from typing import Any
 
 from ..accel import Geometry, InstanceAccelerator
@@ -34,6 +34,8 @@ def scene_fingerprint(compiled: CompiledScene, geometries: Sequence[Geometry]) -
     parts = {each.name: getattr(compiled, each.name) for each in fields(compiled)}
     accelerator = parts.pop("accelerator")
     del parts["specular_surfaces"]  # they follow from the rest, and the setting is compared by itself
+    if compiled.media is not None:
+        parts["media"] = replace(compiled.media, touching=None)  # likewise
     del parts["roulette_after"]  # a setting, which is compared by itself
     placements = accelerator.placements if isinstance(accelerator, InstanceAccelerator) else None
     return fingerprint("the scene", {**parts, "geometries": list(geometries), "placements": placements})

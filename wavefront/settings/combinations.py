@@ -25,7 +25,7 @@ class Exclusion:
 ONE_PATH = "light of shared paths comes from many paths at once"
 ANY_PIXEL = "paths from lights reach any pixel"
 ONLY_FULL = "only the paths of integrator='full' go on from surface to surface with light samples"
-MEDIA = "media that scatter"  # or emit, or overlap: known of a scene once it is compiled
+MEDIA = "media that scatter"  # or emit, or vary: known of a scene once it is compiled
 GIVEN = "samples are given by their numbers"
 EXCLUSIONS = (
     Exclusion("reuse", "clamp", f"a clamp limits what one path finds, and {ONE_PATH}"),

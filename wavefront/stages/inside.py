@@ -13,6 +13,7 @@ from ..compile.media import DEPTH, ENTRY
 from ..compile.scene import CompiledScene
 from .interaction import interaction
 from .intersect import intersect
+from .medium import crossings
 from .transmittance import continue_behind
 
 OUTWARD = np.array([[0.5337], [0.6129], [0.5827]], f4)  # any direction along which nothing is aligned
@@ -56,13 +57,13 @@ def _enclosing(scene: CompiledScene, origin: Floats) -> NDArray[Any]:
         if not lanes.size:
             break
         surface = interaction(scene, rays, hits)
-        entry = media.entry_of.take(surface.material)
-        open_[entry, lanes] += ~surface.back_facing
-        leaves = surface.back_facing & (entry > 0)
-        around = np.flatnonzero(leaves & (open_[entry, lanes] == 0))
-        open_[entry, lanes] -= leaves & (open_[entry, lanes] > 0)
-        at = lanes.take(around)
-        stack[np.minimum(depth.take(at), DEPTH), at] = entry.take(around)
-        depth[at] += 1
+        for crossing in crossings(scene, surface):
+            entry, leaves = np.abs(crossing), crossing < 0
+            around = np.flatnonzero(leaves & (open_[entry, lanes] == 0))
+            open_[entry, lanes] -= leaves & (open_[entry, lanes] > 0)
+            open_[entry, lanes] += crossing > 0
+            at = lanes.take(around)
+            stack[np.minimum(depth.take(at), DEPTH), at] = entry.take(around)
+            depth[at] += 1
         rays = continue_behind(rays, surface)
     return stack[:DEPTH]

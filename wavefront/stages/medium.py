@@ -5,15 +5,19 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ..arrays.elementary import exp
 from ..arrays.state import Hits, Paths, Rays, SurfaceInteraction
 from ..arrays.vec import TINY, Bools, Floats, Ints, dot, f4, take
-from ..compile.media import crossed
+from ..compile.media import ENTRY, MediaTable, crossed
 from ..compile.scene import CompiledScene
+from ..compile.touching import TouchingFaces
 from ..media.base import GlowWeights, MediumRays
 from ..sampling.sampler import Dimension, Sampler
 from ..sampling.steps import StepNumbers
+
+LEAST_COS = f4(1 / 64)  # between a ray and a normal, for how far it is moved back
 
 
 def absorb(scene: CompiledScene, throughput: Floats, hits: Hits, surface: SurfaceInteraction) -> None:
@@ -54,6 +58,10 @@ def fly(
         return lanes
     reached = np.ones(lanes.size, np.bool_)
     medium, some = medium.take(inside), lanes.take(inside)
+    if media.only_absorbs:
+        length = take(hits.t, some)
+        paths.throughput[:, some] *= _through(media, paths, some, medium, length, None)
+        return lanes
     address = take(paths.pixel, some), take(paths.sample, some), bounce, Dimension.MEDIUM + segment
     u = sampler.draw_2d(*address)
     steps = StepNumbers.of(sampler.seed, *address) if media.takes_steps else None
@@ -112,10 +120,21 @@ def transmitted(
     assert media is not None
     medium, part = media.medium_in(stack), np.ones_like(rays.direction)
     inside = np.flatnonzero(medium >= 0)
-    for record, rows, column in media.by_record(medium.take(inside)):
-        at = inside.take(rows)
-        some = None if steps is None else steps.take(at)
-        part[:, at] = record.transmittance(_within(column, rays, at, length.take(at), some))
+    if inside.size:
+        some = None if steps is None else steps.take(inside)
+        part[:, inside] = _through(media, rays, inside, medium.take(inside), length.take(inside), some)
+    return part
+
+
+def _through(
+    media: MediaTable, rays: Rays, lanes: Ints, medium: Ints, length: Floats, steps: StepNumbers | None
+) -> Floats:
+    """Return what part of the light gets over lengths (k,) of some lanes of rays in their media, (3, k)."""
+    part = np.empty((3, lanes.size), f4)
+    for record, rows, column in media.by_record(medium):
+        some = None if steps is None else steps.take(rows)
+        within = _within(column, rays, lanes.take(rows), length.take(rows), some)
+        part[:, rows] = record.transmittance(within)
     return part
 
 
@@ -135,4 +154,52 @@ def cross(scene: CompiledScene, stack: Any, surface: SurfaceInteraction) -> Any:
     """Return stacks (4, n) behind surfaces; None where the scene needs none."""
     if scene.media is None or stack is None:
         return stack
-    return crossed(stack, scene.media.crossing(surface.material, surface.back_facing))
+    return crossed(stack, crossings(scene, surface))
+
+
+def crossings(scene: CompiledScene, surface: SurfaceInteraction) -> NDArray[Any]:
+    """Return what crossing surfaces does to stacks, as `MediaTable.crossing`, a row for each surface.
+
+    There are two rows, (2, n), where shapes lie on each other, and else one, (1, n).
+    """
+    media = scene.media
+    assert media is not None
+    own = media.crossing(surface.material, surface.back_facing)
+    if media.touching is None:
+        return own[None]
+    return np.stack([_crossing_of_other(scene, media.touching, surface), own])
+
+
+def _crossing_of_other(
+    scene: CompiledScene, touching: TouchingFaces, surface: SurfaceInteraction
+) -> NDArray[Any]:
+    """Return what crossing the surfaces of other shapes that lie on these does to stacks, (n,).
+
+    A ray that begins a little before a surface and does not meet it meets the one that lies on it.
+    """
+    assert scene.media is not None
+    other = np.zeros(len(surface), ENTRY)
+    known = np.flatnonzero((surface.prim >= 0) & (surface.prim < touching.number.size))
+    number = touching.number.take(surface.prim.take(known))
+    lanes, number = known.compress(number >= 0), number.compress(number >= 0)
+    if not lanes.size:
+        return other
+    here = surface.take(lanes)
+    before = f4(4) * here.error / np.maximum(np.abs(dot(here.ng, here.wo)), LEAST_COS)
+    start, group, layer = (
+        here.point + here.wo * before,
+        *(each.take(number) for each in (touching.group, touching.layer)),
+    )
+    for of_layer, (members, accelerator) in enumerate(
+        zip(touching.members, touching.accelerators, strict=True)
+    ):
+        some = np.flatnonzero(layer != of_layer)
+        found = accelerator.closest(take(start, some), -take(here.wo, some), np.full(some.size, -1))
+        met = members.take(found.prim)
+        near = (found.prim >= 0) & (found.t < f4(2) * before.take(some))
+        near &= touching.group.take(met) == group.take(some)
+        some, met = some.compress(near), met.compress(near)
+        opposite = dot(touching.front.take(met, 1), touching.front.take(number.take(some), 1)) < 0
+        back_facing = here.back_facing.take(some) ^ opposite
+        other[lanes.take(some)] = scene.media.crossing(touching.material.take(met), back_facing)
+    return other

@@ -19,7 +19,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
-from typing import Self
+from typing import Any, Self
 
 import numpy as np
 
@@ -40,6 +40,7 @@ from ..arrays.vec import (
     spans,
     take,
 )
+from ..compile.media import ENTRY, crossed
 from ..compile.scene import CompiledScene
 from ..sampling.tiles import MEMBERS, WaveTiles
 from .glossy_points import SECTIONS, GlossyPoints, glossy_materials
@@ -71,9 +72,9 @@ def shared_points(
 ) -> tuple[Ints, SharedPoints, int]:
     """Return the lanes (k,) of paths whose second surfaces can be shared, and these points, first matte ones.
 
-    They are points without normal maps, which no medium separates from the first ones, and which were not
-    found by a delta lobe. Interpolated normals that the viewer sees at a grazing angle depend on the viewer.
-    The last value is how many points are matte; the others are of stages/glossy_points.py.
+    They are points without normal maps, which no medium without a table separates from the first ones, and
+    which were not found by a delta lobe. Interpolated normals that the viewer sees at a grazing angle depend
+    on the viewer. The last value is how many points are matte; the others are of stages/glossy_points.py.
     """
     rows = material_rows(scene, hits, ALL)
     matte = shared_materials(scene).take(rows)
@@ -159,7 +160,7 @@ def add_shared(
     albedo = lit.albedo() if plain else None
     received = [np.zeros((3, slot.size), f4) for _ in sums]
     for some in spans(tiles.count, TILES_AT_ONCE):
-        first = FirstPoints.of(lit, albedo, lane_in[:, some])
+        first = FirstPoints.of(lit, albedo, lane_in[:, some], paths.media)
         if first is None:
             continue
         numbers = [numbers[:, some] for numbers in number_in]
@@ -295,9 +296,11 @@ class FirstPoints:
     albedo: Floats | None  # (3, members, t) by which f is multiplied in the end
     ng: Floats | None  # (3, ·) unit geometric normals, if they differ from the shading normals
     guidance: Guidance | None
+    media: Any  # (4, ·) stacks of what the paths that come are inside of, and what crossing does to them,
+    crossing: Any  # (k, ·); None in scenes without a table of media
 
     @classmethod
-    def of(cls, lit: Shading, albedo: Floats | None, lane_in: Ints) -> Self | None:
+    def of(cls, lit: Shading, albedo: Floats | None, lane_in: Ints, media: Any = None) -> Self | None:
         """Return the points of a grid (members, t) of lanes, where -1 stands for none; None if all are -1.
 
         Parameters
@@ -306,16 +309,22 @@ class FirstPoints:
             The first surfaces of a wave, n lanes.
         albedo
             (3, n) if all are Lambertian.
+        media
+            (4, n or more) stacks of what the paths that come are inside of.
         """
         present, shape = lane_in >= 0, lane_in.shape
         some = lane_in[present]
         if not some.size:
             return None
         lanes = np.where(present, lane_in, some[0]).reshape(-1)
+        inside = None, None
+        if media is not None:
+            inside = take(media, lanes), take(lit.crossing, lanes)
         if albedo is None:
             at = lit.at(lanes)
             start, error = at.start.reshape(3, *shape), at.surface.error.reshape(shape)
-            return cls(present, start, error, at.surface.prim, at.surface.ns, at, None, None, at.guidance)
+            prim, ns = at.surface.prim, at.surface.ns
+            return cls(present, start, error, prim, ns, at, None, None, at.guidance, *inside)
         surface, albedo = lit.surface, take(albedo, lanes).reshape(3, *shape)
         return cls(
             present & (highest(albedo) != 0),
@@ -327,6 +336,7 @@ class FirstPoints:
             albedo,
             None if surface.ns is surface.ng else take(surface.ng, lanes),
             lit.guidance_at(lanes),
+            *inside,
         )
 
     def evaluate(self, wi: Floats) -> tuple[Floats, Floats]:
@@ -349,6 +359,16 @@ class FirstPoints:
         surface, shape = self.shade.surface, self.start.shape
         cos = dot(surface.ng.reshape(shape), point - surface.point.reshape(shape))
         return offset_origin(surface, cos.reshape(-1)).reshape(shape)
+
+    def stacks(self, direction: Floats, lanes: Ints) -> Any:
+        """Return the stacks (4, k) of rays that leave some cells along directions (3, k)."""
+        if self.media is None:
+            return None
+        media = take(self.media, lanes)
+        if self.shade is None:  # rays leave on the side from which the paths came
+            return media
+        below = dot(take(self.shade.surface.ng, lanes), direction) < 0
+        return crossed(media, np.where(below, take(self.crossing, lanes), ENTRY(0)))
 
 
 @soa
@@ -401,7 +421,7 @@ def connect(
     geometry = cos_target * inverse
     geometry *= inverse
     geometry *= possible
-    if scene.opacities is None:
+    if scene.opacities is None and scene.media is None:
         possible[member] = False
     lanes = np.flatnonzero(possible)
     error = first.error + target.error
@@ -412,6 +432,7 @@ def connect(
         error=take(error.reshape(-1), lanes),
         distance=f4(1) / take(inverse.reshape(-1), lanes),
         cos_light=take(cos_target.reshape(-1), lanes),
+        media=first.stacks(take(wi, lanes), lanes),
     )
     return Connections(f.reshape(-1, *shape), pdf.reshape(shape), geometry, lanes, rays)
 
@@ -420,10 +441,25 @@ def attenuate(scene: CompiledScene, of_rows: list[Connections]) -> None:
     """Multiply connections, in place, by the transmittance between their points: one query for all."""
     if not of_rows:
         return
-    through = _transmittance(scene, ShadowRays.concatenate([each.rays for each in of_rows]))
-    ends = np.cumsum([each.lanes.size for each in of_rows])
-    for each, part in zip(of_rows, np.split(through, ends[:-1]), strict=True):
+    rays = ShadowRays.concatenate([each.rays for each in of_rows])
+    ends = np.cumsum([each.lanes.size for each in of_rows])[:-1]
+    if scene.media is not None:
+        _absorb(of_rows, np.split(transmittance_along(scene, rays), ends, 1))
+        return
+    for each, part in zip(of_rows, np.split(_transmittance(scene, rays), ends), strict=True):
         each.geometry.reshape(-1)[each.lanes] *= part
+
+
+def _absorb(of_rows: list[Connections], parts: list[Floats]) -> None:
+    """Weaken connections, in place, by what media let through, (3, k) each.
+
+    Paths get through media that only absorb, so densities do not fall: all that is not blocked counts for
+    the weights.
+    """
+    for each, part in zip(of_rows, parts, strict=True):
+        each.geometry.reshape(-1)[each.lanes] *= highest(part) > 0
+        each.f = np.repeat(each.f, 3, 0) if len(each.f) == 1 else each.f.copy()
+        each.f.reshape(3, -1)[:, each.lanes] *= part
 
 
 def _transmittance(scene: CompiledScene, rays: ShadowRays) -> Floats:
@@ -447,9 +483,10 @@ def can_reuse(scene: CompiledScene) -> bool:
     Where surfaces with alpha and media are mixed none is: what gets through differs between channels then.
     Nor is any where media scatter.
     """
-    if scene.media is not None:
+    if scene.media is not None and not scene.media.only_absorbs:
         return False
-    mixed = scene.opacities is not None and scene.absorption is not None
+    absorbs = scene.absorption is not None or scene.media is not None
+    mixed = scene.opacities is not None and absorbs
     return not mixed and bool((shared_materials(scene) | glossy_materials(scene)).any())
 
 

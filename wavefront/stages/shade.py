@@ -23,6 +23,7 @@ from ..sampling.sampler import Dimension, Sampler
 from ..sampling.steps import StepNumbers
 from .interaction import interaction, offset_origin, origin_above
 from .intersect import ShadowRays, shadow_rays, visible
+from .medium import crossings
 from .normal_mapping import folded_onto
 from .transmittance import transmittance_along
 
@@ -56,7 +57,7 @@ class Shading:
     guidance: Guidance | None = None  # of the lanes of `lit`; None where BSDFs alone choose directions
     receiver: Receiver | None = None  # what lights are sampled for; None where no light takes it
     volume: Ints | None = None  # lanes within media, where there is no cosine; None in scenes without media
-    crossing: Any = None  # (n,) what light that crosses the surfaces does to stacks; likewise
+    crossing: Any = None  # (k, n) what light that crosses the surfaces does to stacks; likewise
     materials: MaterialTable | None = None  # of the scene
 
     def lit(self) -> Shading:
@@ -69,7 +70,7 @@ class Shading:
         first = slice(last.stop)
         parts = self.surface.take(first), self.frame.take(first), self.wo[:, first], self.start[:, first]
         receiver = None if self.receiver is None else self.receiver.take(first)
-        crossing = None if self.crossing is None else self.crossing[first]
+        crossing = None if self.crossing is None else self.crossing[:, first]
         return Shading(*parts, groups, self.guidance, receiver, self.volume, crossing, self.materials)
 
     def at(self, lanes: Ints) -> Shading:
@@ -208,7 +209,7 @@ def shading(scene: CompiledScene, surface: SurfaceInteraction) -> Shading:
     )
     if scene.media is not None:
         shade.volume = np.flatnonzero(surface.prim < 0)
-        shade.crossing = scene.media.crossing(surface.material, surface.back_facing)
+        shade.crossing = crossings(scene, surface)
     return shade
 
 
