@@ -58,6 +58,8 @@ def test_nrrd_that_is_not_read(tmp_path) -> None:
     raw = (tmp_path / "a.nrrd").read_bytes()
     for data, message in (
         (b"NRRD", "a.nrrd"),
+        (b"", "a.nrrd: "),
+        (raw.replace(b"dimension: 3", b"dimension: x"), "a.nrrd: is not read by pynrrd"),
         (whole[:-8], "a.nrrd: has packed data that end early"),
         (raw[:-8], "a.nrrd: is not read by pynrrd"),
         (whole.replace(b"sizes: 2 3 4", b"sizes: 2 3 -4"), "sizes"),

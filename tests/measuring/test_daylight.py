@@ -222,6 +222,13 @@ def test_reading_a_weather_file(asked, tmp_path) -> None:
     assert times == [datetime(1999, 6, 20, 23, 30, tzinfo=utc), datetime(1999, 6, 21, 22, 30, tzinfo=utc)]
 
 
+def test_a_place_that_is_nowhere(tmp_path) -> None:
+    pytest.importorskip("pvlib")
+    (tmp_path / "bad.epw").write_text(epw(row(1, 0, 0), head="LOCATION,x,,,,,99,11,1,0"))
+    with pytest.raises(wf.SceneError, match=r"bad\.epw: latitude is 99"):
+        wf.load_weather(tmp_path / "bad.epw")
+
+
 @pytest.mark.parametrize(
     ("text", "said"),
     [
@@ -234,6 +241,20 @@ def test_reading_a_weather_file(asked, tmp_path) -> None:
         (epw(row(1, 0, 9999)), "line 9 has the irradiances"),
         (epw(row(1, 0, 0, "1999,2,30")), "line 9 has no such day"),
         (epw(row(1, 0, 0).replace("1999", "noon")), "line 9 is malformed"),
+        *[
+            (epw(row(1, 0, 0).replace(f",{old},", f",{odd},", 1)), "line 9 (is malformed|has the)")
+            for old in ("1", "6", "21")  # the hour, the month, the day
+            for odd in ("nan", "inf", "1e20", "-1e20", "25000")
+        ],
+        *[
+            (epw(row(1, 0, 0).replace("1999", odd)), "line 9 (is malformed|has the year)")
+            for odd in ("nan", "inf", "1e20", "0", "9999")
+        ],
+        *[
+            (epw(row(1, 0, 0), head=f"LOCATION,x,,,,,48,{odd}"), "line 1 ")
+            for odd in ("11,nan,0", "inf,1,0", "11,1e20,0", "11,1,nan")
+        ],
+        (epw(row(25, 0, 0)), "line 9 has the hour 25; it must be from 0 to 24"),
     ],
 )
 def test_files_that_are_no_weather(asked, tmp_path, text: str, said: str) -> None:

@@ -369,6 +369,8 @@ def test_tables_of_points(tmp_path: Path, text: str, points: Any, directions: An
         ("x,y,z\n", "has no point"),
         ("1 2 3\n1 2\n", "line 2 has 2 numbers; all lines must have 3, or all 6"),
         ("1 2 3\n1 2 3 4 5 6\n", "line 2 has 6 numbers"),
+        ("1 2 3\n1 nan 3\n", "line 2 is '1 nan 3'; its numbers must be finite"),
+        ("1 2 inf\n", "line 1 is '1 2 inf'; its numbers must be finite"),
         ("1 2 3\n1 2 x\n", "line 2 is '1 2 x'; it must be numbers"),
     ],
 )

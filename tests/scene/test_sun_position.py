@@ -107,3 +107,10 @@ def test_a_time_without_a_zone_is_taken_for_utc_with_a_warning(time) -> None:
         sun = wf.sun_position(time, 48.1, 11.6)
     known = wf.sun_position("2026-06-21 14:00+02:00", 48.1, 11.6)
     assert np.abs(sun - known).max() < 1e-12
+
+
+@pytest.mark.parametrize("time", [float("nan"), [None, "2026-06-21"], "nat", object(), []])
+def test_a_time_that_is_missing(time: object) -> None:
+    pytest.importorskip("pvlib")
+    with pytest.raises(wf.SceneError, match=r"^time is "):
+        wf.sun_position(time, 48, 11)

@@ -67,8 +67,10 @@ def read_nrrd(path: str, data: bytes, budget: Budget, name: str | None = None) -
         values = nrrd.read_data(header, file, index_order="C")
     except SceneError:
         raise
-    except (nrrd.NRRDError, KeyError, ValueError, TypeError, OSError, EOFError, zlib.error) as error:
-        raise SceneError(f"is not read by pynrrd: {error}") from error
+    except MemoryError:
+        raise
+    except Exception as error:  # of any type: a header without an end raises StopIteration
+        raise SceneError(f"is not read by pynrrd: {str(error) or type(error).__name__}") from error
     colors = len(sizes) - 3
     if colors == 1 and "space directions" in header:
         colors = 1 if np.isnan(header["space directions"][0]).all() else -1

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..arrays.vec import Doubles, Floats, f4
-from ..codecs.budget import Budget
+from ..codecs.budget import Budget, in_memory
 from ..codecs.npz import read_array, read_arrays
 from ..core.errors import SceneError, one_of
 from ..core.files import extension_of, path_name, read_bytes
@@ -63,15 +63,18 @@ def load_grid(
     data = read_bytes(path, limits.file_bytes)
     budget = Budget(limits.pixels, limits.memory_bytes)
     budget.add_file(len(data))
-    return parsed_grid(path_name(path), data, budget, name)
+    with in_memory(path):
+        return parsed_grid(path_name(path), data, budget, name)
 
 
 def parsed_grid(path: str, data: bytes, budget: Budget, name: str | None = None) -> tuple[Floats, Doubles]:
     """Return the grid of a file that has been read; see `load_grid`."""
     try:
         return _reader(path)(path, data, budget, name)
-    except (SceneError, ValueError, OSError) as error:
-        raise SceneError(f"{path}: {error}") from error
+    except MemoryError:
+        raise
+    except Exception as error:  # libraries raise errors of any type on damaged data
+        raise SceneError(f"{path}: {str(error) or type(error).__name__}") from error
 
 
 def _reader(path: PathLike) -> Callable[[str, bytes, Budget, str | None], tuple[Floats, Doubles]]:

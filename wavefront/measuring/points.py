@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+import math
 import os
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from ..arrays.vec import Doubles
-from ..core.errors import SceneError, finite_array
+from ..core.errors import SceneError, finite_array, in_brief
 from ..core.files import decode_text, read_bytes
 from ..core.suggestions import suggests_keywords
 from ..settings import whole_number
@@ -94,12 +95,16 @@ def load_points(path: str | os.PathLike[str]) -> tuple[Doubles, Doubles | None]:
             rows.append([float(word) for word in words])
         except ValueError:
             if rows or at > 1:
-                raise SceneError(f"{os.fspath(path)}: line {at} is {line!r}; it must be numbers") from None
+                raise SceneError(
+                    f"{os.fspath(path)}: line {at} is {in_brief(line)}; it must be numbers"
+                ) from None
             continue
         if len(rows[-1]) not in (3, 6) or len(rows[-1]) != len(rows[0]):
             raise SceneError(
                 f"{os.fspath(path)}: line {at} has {len(rows[-1])} numbers; all lines must have 3, or all 6"
             )
+        if not all(map(math.isfinite, rows[-1])):
+            raise SceneError(f"{os.fspath(path)}: line {at} is {in_brief(line)}; its numbers must be finite")
     if not rows:
         raise SceneError(f"{os.fspath(path)}: has no point")
     table = np.array(rows)

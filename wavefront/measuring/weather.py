@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import os
 from collections.abc import Sequence
 from datetime import UTC, datetime, timedelta, timezone
@@ -17,10 +18,11 @@ from ..core.suggestions import suggests_keywords
 from ..lights import SkyPatches
 from ..lights.sky import SOLAR_CONSTANT, relative_radiance
 from ..lights.sky_functions import perez_function
-from ..scene.sun_position import sun_position
+from ..scene.sun_position import horizon_axes, sun_position
 
 HEADER = 8  # lines of an EPW file
 YEAR, MINUTE, DIRECT, DIFFUSE = 0, 4, 14, 15  # columns
+RANGES = (("year", 0, 1700, 2200), ("month", 1, 1, 12), ("day", 2, 1, 31), ("hour", 3, 0, 24))  # by columns
 MISSING = 9999  # stands for a value that was not measured
 
 
@@ -158,6 +160,8 @@ def load_weather(
             f"{name}: is no weather file: the first of more than {HEADER} lines must be LOCATION"
         )
     latitude, longitude, zone, altitude = _numbers(name, 1, head, range(6, 10))
+    if not abs(zone) < 24:
+        raise SceneError(f"{name}: line 1 has the time zone {zone:g}; it must be within 24 hours of UTC")
     times, rows = [], []
     for at, line in enumerate(lines[HEADER:], HEADER + 1):
         words = line.split(",")
@@ -166,6 +170,10 @@ def load_weather(
             raise SceneError(
                 f"{name}: line {at} has the irradiances {values[-2:]}; they must be from 0 to {MISSING}"
             )
+        for what, column, low, high in RANGES:
+            if not low <= values[column] <= high:
+                limit = f"it must be from {low} to {high}"
+                raise SceneError(f"{name}: line {at} has the {what} {values[column]:g}; {limit}")
         year, month, day, hour = (int(value) for value in values[:4])
         try:
             midnight = datetime(year, month, day, tzinfo=timezone(timedelta(hours=zone)))
@@ -174,7 +182,11 @@ def load_weather(
         times.append(midnight + timedelta(hours=hour - 0.5))
         rows.append(values[-2:])
     utc = [time.astimezone(UTC) for time in times]
-    sun = sun_position(utc, latitude, longitude, altitude=altitude, up=up, north=north)
+    horizon_axes(up, north)  # these are no fault of the file
+    try:
+        sun = sun_position(utc, latitude, longitude, altitude=altitude, up=up, north=north)
+    except SceneError as error:
+        raise SceneError(f"{name}: {error}") from error
     direct, diffuse = np.array(rows).T
     return Weather(direct, diffuse, sun)
 
@@ -182,6 +194,10 @@ def load_weather(
 def _numbers(name: str, at: int, words: list[str], columns: Sequence[int]) -> list[float]:
     """Return the numbers of some columns of a line."""
     try:
-        return [float(words[column]) for column in columns]
+        values = [float(words[column]) for column in columns]
     except (IndexError, ValueError) as error:
         raise SceneError(f"{name}: line {at} is malformed: {error}") from error
+    for column, value in zip(columns, values, strict=True):
+        if not math.isfinite(value):
+            raise SceneError(f"{name}: line {at} is malformed: column {column + 1} is {value}")
+    return values

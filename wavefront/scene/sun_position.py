@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike
 from ..arrays.elementary import sin_cos_turns
 from ..arrays.vec import Doubles
 from ..camera import upward
-from ..core.errors import SceneError, finite_array, number, warn_caller
+from ..core.errors import SceneError, finite_array, in_brief, number, warn_caller
 from ..core.suggestions import suggests_keywords
 from .scene import turned_up
 
@@ -80,8 +80,10 @@ def sun_position(
         raise ImportError("sun_position needs pvlib: pip install pvlib") from error
     try:
         times = pandas.DatetimeIndex(np.atleast_1d(np.asarray(time, dtype=object)))
-    except (TypeError, ValueError) as error:
-        raise SceneError(f"time is {time!r}; it must be a time, or several: {error}") from error
+    except (TypeError, ValueError, OverflowError) as error:
+        raise SceneError(f"time is {in_brief(time)}; it must be a time, or several: {error}") from error
+    if not len(times) or getattr(times, "hasnans", False):
+        raise SceneError(f"time is {in_brief(time)}; it must be a time, or several, none of which is missing")
     if getattr(times, "tz", UTC) is None:
         warn_caller(
             f"sun_position: the time {times[0]} has no zone and is taken for UTC; write {times[0]}+00:00 if "
