@@ -455,18 +455,21 @@ def test_a_missing_library_and_a_missing_material(write):
 @pytest.mark.parametrize(
     "reference", ["../s.mtl", "/etc/hostname", "C:\\s.mtl", "http://example.org/s.mtl", "..\\s.mtl"]
 )
-def test_libraries_outside_the_folder_are_refused(write, reference):
-    with pytest.raises(SceneError, match=r"scene\.obj: refers to "):
-        load_meshes(write(f"mtllib {reference}\n{SQUARE}f 1 2 3\n"))
+def test_libraries_outside_the_folder_are_left_out(write, reference):
+    path = write(f"mtllib {reference}\n{SQUARE}f 1 2 3\n")
+    with pytest.warns(UserWarning, match=r"material file .*: scene\.obj: refers to .*; left out"):
+        load_meshes(path)
+    with pytest.raises(SceneError, match=r"material file .*: scene\.obj: refers to "):
+        load_meshes(path, strict=True)
 
 
-def test_a_library_behind_a_symlink_is_refused(write, tmp_path):
+def test_a_library_behind_a_symlink_is_left_out(write, tmp_path):
     inside = tmp_path / "scene"
     inside.mkdir()
     (tmp_path / "s.mtl").write_text("newmtl m\n")
     (inside / "s.mtl").symlink_to(tmp_path / "s.mtl")
     (inside / "a.obj").write_text(f"mtllib s.mtl\n{SQUARE}f 1 2 3\n")
-    with pytest.raises(SceneError, match="outside its folder"):
+    with pytest.warns(UserWarning, match="outside its folder"):
         load_meshes(inside / "a.obj")
 
 
@@ -638,10 +641,16 @@ def test_textures_of_ply(write, tmp_path):
         (mesh,) = load_meshes(textured_ply(write, "a.png", "b.png"))
     assert mesh.material.bsdf.reflectance.mean() == pytest.approx([1, 0, 0])
     assert load_mesh(textured_ply(write, "b.png"), Diffuse(0.25)).material.bsdf.reflectance[0] == 0.25
-    with pytest.raises(SceneError, match=r"a\.ply: refers to '\.\./b\.png', which is outside its folder"):
-        load_meshes(textured_ply(write, "../b.png"))
+    for name in ("../b.png", "C:\\\\author\\\\b.png", "/home/author/b.png", "./textures/B.PNG"):
+        with pytest.warns(UserWarning, match=r"a\.ply: the file '.*' is missing; 'b\.png' in its place"):
+            (mesh,) = load_meshes(textured_ply(write, name))
+        assert mesh.material.bsdf.reflectance.mean() == pytest.approx([1, 0, 0])
+    for name in ("../c.png", "/etc/passwd"):
+        with pytest.warns(UserWarning, match=r"texture '.*': a\.ply: refers to .*; gray in its place"):
+            (mesh,) = load_meshes(textured_ply(write, name))
+        assert mesh.material is None or mesh.material.bsdf.reflectance.ravel().tolist() == [0.5] * 3
     (tmp_path / "b.png").write_bytes(b"\x89PNG")
-    with pytest.raises(SceneError, match=r"a\.ply: texture 'b\.png': not a readable png or jpg image"):
+    with pytest.warns(UserWarning, match=r"a\.ply: texture 'b\.png': b\.png: not a readable image: .*; gray"):
         load_meshes(textured_ply(write, "b.png"))
 
 

@@ -7,8 +7,10 @@ import imageio.v3 as iio
 import numpy as np
 import pytest
 import trimesh
+from PIL import Image as Pil
 
 from wavefront.bsdfs import Dielectric, Diffuse, Principled
+from wavefront.codecs.images import write_image
 from wavefront.core.errors import SceneError
 from wavefront.io.load import from_trimesh, load_meshes
 from wavefront.textures.image import Texture
@@ -85,10 +87,6 @@ def test_options_without_effect_are_named(one):
         ("map_Kd -s 2", r"line 2: map_Kd names no file"),
         ("map_Kd -mm a b t.png", r"line \d+: map_Kd: -mm is 'a b'; it must be numbers"),
         ("map_Pr -imfchan q t.png", r"line \d+: map_Pr: -imfchan is 'q'; it must be one of r, g, b, m, l"),
-        ("map_Kd t.psd", r"line 2: map_Kd: .*t\.psd: extension is '\.psd'; it must be one of"),
-        ("map_Kd ../t.png", r"line 2: map_Kd: .*s\.mtl: refers to '\.\./t\.png'"),
-        ("map_Kd broken.png", r"s\.mtl line 2: map_Kd: .*broken\.png"),
-        ("map_Kd C:\\t.png", r"absolute path is not followed"),
     ],
 )
 def test_defects_of_maps(one, line, message):
@@ -99,26 +97,71 @@ def test_defects_of_maps(one, line, message):
 @pytest.mark.parametrize(
     ("lines", "missing", "plain"),
     [
-        (("Kd 0.2 0.4 0.6", "map_Kd no.png"), "line 3: map_Kd: texture 'no.png'", ("Kd 0.2 0.4 0.6",)),
-        (("map_Kd -s 2 2 sub/no.png",), "line 2: map_Kd: texture 'sub/no.png'", ()),
+        (("Kd 0.2 0.4 0.6", "map_Kd no.png"), "line 3: map_Kd: texture 'no.png'", ("Kd 0.1 0.2 0.3",)),
+        (("map_Kd -s 2 2 sub/no.png",), "line 2: map_Kd: texture 'sub/no.png'", ("Kd 0.5 0.5 0.5",)),
         (("map_Ke no.exr",), "line 2: map_Ke: texture 'no.exr'", ()),
+        (("Ke 1 1 1", "map_Ke no.exr"), "line 3: map_Ke: texture 'no.exr'", ()),
         (("map_d no.png",), "line 2: map_d: texture 'no.png'", ()),
         (("map_Pr no.png",), "line 2: map_Pr: texture 'no.png'", ()),
         (("norm no.png",), "line 2: norm: texture 'no.png'", ()),
         (("map_Bump -bm 2 no.tga",), "line 2: map_Bump: texture 'no.tga'", ()),
-        (("map_Kd " + "n" * 300,), "line 2: map_Kd: texture 'nnn", ()),
+        (("map_Kd " + "n" * 3000,), "line 2: map_Kd: texture 'nnn", ("Kd 0.5 0.5 0.5",)),
     ],
 )
 def test_missing_images_are_announced_and_left_out(one, lines, missing, plain):
-    with pytest.warns(UserWarning, match=rf"s\.mtl {missing}.* is missing; left out$") as record:
+    """But for colors, which are gray."""
+    done = "gray in its place" if "map_Kd" in missing else "left out"
+    with pytest.warns(UserWarning, match=rf"s\.mtl {missing}.*; {done}$") as record:
         mesh = one(*lines)
     assert len(record) == 1
     expected = one(*plain)
     assert type(mesh.material.bsdf) is type(expected.material.bsdf) is Diffuse
-    assert np.array_equal(mesh.material.bsdf.reflectance, expected.material.bsdf.reflectance)
+    found = mesh.material.bsdf.reflectance
+    color = found.mean() if isinstance(found, Texture) else found.ravel()
+    assert color == pytest.approx(expected.material.bsdf.reflectance.ravel())
     assert mesh.emission is None
-    with pytest.raises(SceneError, match=rf"s\.mtl {missing}.* is missing; left out$"):
+    with pytest.raises(SceneError, match=rf"s\.mtl {missing}.*; {done}$"):
         one(*lines, strict=True)
+
+
+@pytest.mark.parametrize(
+    ("line", "message"),
+    [
+        ("map_Kd t.psd", r"texture 't\.psd': t\.psd: extension is '\.psd'; it must be one of"),
+        ("map_Kd broken.png", r"texture 'broken\.png': broken\.png: ends early: .*; gray in its place"),
+        ("norm broken.png", r"texture 'broken\.png': broken\.png: ends early: .*; left out"),
+        (
+            "map_d nan.exr",
+            r"texture 'nan\.exr': .* has 1 value that is not finite.*; left out",
+        ),
+        (
+            "map_Kd ../no.png",
+            r"texture '\.\./no\.png': s\.mtl: refers to .*outside.*; gray in its place",
+        ),
+        ("map_Kd C:\\no.png", r".*an absolute path is not followed; gray in its place"),
+    ],
+)
+def test_damaged_images_cost_no_more_than_themselves(one, tmp_path, line, message):
+    write_image(tmp_path / "nan.exr", np.array([[[1, np.nan, 1]]], np.float32))
+    with pytest.warns(UserWarning, match=rf"s\.mtl line 3: \w+: {message}"):
+        mesh = one("Ka 0 0 0", line)
+    color = mesh.material.bsdf.reflectance
+    assert (color.mean() if isinstance(color, Texture) else color.ravel()) == pytest.approx([0.5] * 3)
+    assert mesh.material.normal_map is None
+
+
+@pytest.mark.parametrize("options", ["", "-imfchan l "])
+@pytest.mark.parametrize("shape", [(1, 2, 2), (1, 2, 4), (1, 2, 3)])
+def test_opacity_is_the_alpha_of_an_image(one, tmp_path, shape, options):
+    """Without alpha, or where the file says so, it is the luminance."""
+    codes = np.zeros(shape, np.uint8)
+    codes[0, 0] = 255
+    codes[0, 0, 0] = 0 if shape[2] % 2 == 0 else 255
+    Pil.fromarray(codes).save(tmp_path / "leaf.png")
+    alpha = one(f"map_d {options}leaf.png").material.alpha
+    has_alpha = shape[2] in (2, 4)
+    luminance = 1 - 0.2126 if shape[2] == 4 else 0 if shape[2] == 2 else 1
+    assert alpha.mean() * 2 == pytest.approx(1 if has_alpha and not options else luminance, abs=2e-3)
 
 
 def test_the_pbr_extension(given):
@@ -174,7 +217,6 @@ def test_a_bump_map_that_looks_like_normals_is_one(one, tmp_path):
 @pytest.mark.parametrize(
     ("line", "message"),
     [
-        ("norm broken.png", r"s\.mtl line 2: norm: .*broken\.png: ends early"),
         ("bump -bm x t.png", r"s\.mtl line 2: bump: .*-bm is 'x'; it must be numbers|-bm is 'x'"),
         ("norm -s 0 t.png", r"s\.mtl line 2: norm: NormalMap: the transform of .* is singular"),
         ("bump -bm nan t.png", r"s\.mtl line 2: bump: BumpMap height is nan"),

@@ -205,13 +205,6 @@ WRONG = {
     "has a document type": '<!DOCTYPE a [<!ENTITY b "c">]><materialx/>',
     "nested deeper than 32": HEAD + "<a>" * 50 + "</a>" * 50 + "</materialx>",
     "material 'M': OpenPBRBsdf base_color": document(base_color=(2.0, 0.0, 0.0)),
-    "there is no such file": document(
-        nodes=node("image", "color3", "i"), base_color=link("base_color", "color3", "i")
-    ),
-    "outside its folder": document(
-        nodes=node("image", "color3", "i").replace("a.png", "../../a.png"),
-        base_color=link("base_color", "color3", "i"),
-    ),
     "refers to nodes more than": document(
         nodes=f'<constant name="n0" type="float"/>{BOMB}', base_weight=link("base_weight", "float", "n40")
     ),
@@ -223,6 +216,21 @@ def test_wrong_documents(load, message):
     with pytest.raises(wf.SceneError, match=r"a\.mtlx.*" if "file" not in message else ".*") as error:
         load(WRONG[message])
     assert message in str(error.value)
+
+
+@pytest.mark.parametrize("file", ["a.png", "../../a.png", "C:\\a.png", "broken.png"])
+def test_images_that_cannot_be_read_are_gray(load, tmp_path, file):
+    """And numbers have their defaults."""
+    (tmp_path / "broken.png").write_bytes(b"\x89PNG")
+    nodes = (node("image", "color3", "c") + node("image", "float", "f")).replace("a.png", file)
+    links = {
+        "base_color": link("base_color", "color3", "c"),
+        "specular_roughness": link("specular_roughness", "float", "f"),
+    }
+    with pytest.warns(UserWarning, match=r"c: texture .*; gray in its place"):
+        bsdf = load(document(nodes=nodes, **links))["M"].bsdf
+    assert bsdf.base_color.mean().tolist() == [0.5, 0.5, 0.5]
+    assert bsdf.specular_roughness == pytest.approx(0.3)
 
 
 @pytest.mark.filterwarnings("ignore")

@@ -190,7 +190,7 @@ def test_textures(tmp_path: Path) -> None:
             (PAINT % (text, IMAGE)).replace("asset inputs:file = @a.png@", "odd inputs:file = 3") + BOUND,
         )
     (tmp_path / "a.png").unlink()
-    with pytest.warns(UserWarning, match=r"/paint/image: the image 'a\.png', which is missing"):
+    with pytest.warns(UserWarning, match=r"/paint/image: texture 'a\.png' is missing; left out"):
         load(tmp_path, PAINT % (text, IMAGE) + BOUND, strict=False)
 
 

@@ -3,14 +3,17 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Sequence
+import re
+from collections.abc import Iterator, Sequence
 from pathlib import Path
+from urllib.parse import unquote
 
 from .errors import SceneError
 
 ARCHIVES = (".npz", ".zip", ".gz", ".tar", ".7z", ".bz2", ".xz", ".zst")
 GZIPPED = (".ply.gz", ".pbrt.gz")  # the files of pbrt that may be packed
 SCHEMES = ("http:", "https:", "file:", "ftp:")
+MOST_PARTS = 8  # of a path, that are looked for in other folders
 
 
 def followed(
@@ -56,3 +59,64 @@ def followed(
     if not allowed:
         raise SceneError(f"{refers}, which is outside its folder and the search paths")
     return allowed
+
+
+def elsewhere(
+    source: str | os.PathLike[str], reference: str, places: Sequence[Path], roots: Sequence[Path]
+) -> Path | None:
+    """Return a file that a path of another machine may mean: its last parts, in one of some folders.
+
+    `D:/someone/textures/wood.png` means `textures/wood.png`, or else `wood.png`. Where there is no file of
+    this name, one whose name differs in case alone is taken.
+
+    Parameters
+    ----------
+    source, reference, places, roots
+        As of `followed`, whose rules hold for what is found.
+
+    Returns
+    -------
+    Path or None
+        The file, if there is one.
+    """
+    for exact in (True, False):
+        for name in _names(reference):
+            for place in places:
+                found = place / name if exact else _in_any_case(place, name)
+                if found is not None and os.path.exists(found) and _is_followed(source, found, place, roots):
+                    return found
+    return None
+
+
+def _names(reference: str) -> Iterator[str]:
+    """Yield the last parts of a path, the longest first, as they are and as those of a URI."""
+    path = reference.replace("\\", "/")
+    if "://" in path or path.lower().startswith(SCHEMES):
+        path = re.split("[?#]", path)[0]
+    for text in dict.fromkeys((path, unquote(path))):
+        bare = re.sub("^[A-Za-z][A-Za-z0-9+.-]*:", "", text)  # a scheme or a drive
+        parts = [part for part in bare.split("/") if part not in ("", ".", "..")]
+        for start in range(max(0, len(parts) - MOST_PARTS), len(parts)):
+            yield "/".join(parts[start:])
+
+
+def _in_any_case(folder: Path, name: str) -> Path | None:
+    """Return the file in a folder whose name, or the folders on the way to it, differ in case alone."""
+    found = folder
+    for part in name.split("/"):
+        try:
+            there = sorted(os.listdir(found))
+        except OSError:
+            return None
+        alike = next((each for each in there if each.casefold() == part.casefold()), None)
+        if alike is None:
+            return None
+        found = found / alike
+    return found
+
+
+def _is_followed(source: str | os.PathLike[str], path: Path, place: Path, roots: Sequence[Path]) -> bool:
+    try:
+        return path in followed(source, os.fspath(path.relative_to(place)), [place], roots)
+    except SceneError:
+        return False

@@ -17,8 +17,10 @@ from ..core.errors import LimitError, SceneError, finite_array, in_brief, number
 from ..materials import Material
 from ..media import Isotropic
 from ..textures.base import BaseTexture
+from ..textures.image import StoredImage
 from .losses import Losses
 from .repair import RawMesh
+from .sources import GRAY as GRAY_PIXEL
 from .sources import SceneFiles
 from .spectra import read_spectrum
 
@@ -164,6 +166,11 @@ class Conversion(Generic[P]):
         values = (value if isinstance(value, float) else id(value) for value in parts.values())
         made: Material = self.once((id(material), *parts, *values), make)[0]
         return made
+
+    def picture(self, part: P, reference: str, instead: StoredImage = GRAY_PIXEL) -> StoredImage:
+        """Return the image whose file a part names; a gray one if it is missing or damaged."""
+        read = lambda: self.files.stored(self.find(reference))  # noqa: E731
+        return self.files.shown(reference, read, part.label, instead) or instead
 
     def measured(self, part: P) -> Measured:
         """Return the BSDF of the measured material whose file a part names."""

@@ -123,10 +123,6 @@ class Document:
         except (binascii.Error, ValueError) as error:
             raise SceneError(f"{self.name}: {where} has damaged base64 data: {error}") from error
 
-    def is_missing(self, uri: str) -> bool:
-        """Return whether a URI names a file that does not exist."""
-        return not uri.startswith("data:") and not self.files.find(unquote(uri)).exists()
-
     def buffer(self, index: Any) -> bytes:
         """Return the bytes of a buffer."""
         item = self.get("buffers", index)

@@ -9,19 +9,18 @@ from collections.abc import Callable
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ..arrays.elementary import log, sin_cos_turns
 from ..arrays.vec import FLOAT32_MAX, Doubles
-from ..codecs.images import decode_codes
 from ..core.errors import LimitError, SceneError, printable
-from ..textures.image import Texture
+from ..textures.image import StoredImage, Texture
 from ..textures.normal_map import NormalMap
 from ..textures.parameter import MAX_INDEX
 from .appearance import MaterialSpec, build_material
 from .gltf_anisotropy import Direction, RoughnessAlong
 from .gltf_document import SHOWN, Document, floats, shown
 from .gltf_specular_glossiness import F0, BesideSpecular
+from .sources import GRAY
 
 WRAPS = {10497: "repeat", 33071: "clamp", 33648: "mirror"}
 NEAREST, LINEAR = 9728, 9729
@@ -38,7 +37,7 @@ class GltfMaterials:
     def __init__(self, document: Document) -> None:
         self._document = document
         self._specs: dict[int, MaterialSpec] = {}
-        self._images: dict[int, NDArray[Any] | None] = {}
+        self._images: dict[int, StoredImage | None] = {}
         self._pixels = 0  # of these images
         _check_extensions(document)
 
@@ -53,8 +52,13 @@ class GltfMaterials:
                 self._document.lose(what, where)
         return self._specs[index]
 
-    def texture(self, info: Any, where: str, **arguments: Any) -> Texture | None:
-        """Return a texture for a texture-info object of the JSON, None if its image file is missing."""
+    def texture(
+        self, info: Any, where: str, instead: StoredImage | None = None, **arguments: Any
+    ) -> Texture | None:
+        """Return a texture for a texture-info object of the JSON.
+
+        If its image cannot be read, the texture has that of `instead`, or is None.
+        """
         document = self._document
         if not isinstance(info, dict):
             raise SceneError(f"{document.name}: {where} is {shown(info)}; it must be an object")
@@ -67,11 +71,11 @@ class GltfMaterials:
         if uv_set not in (0, 1):
             document.lose(f"TEXCOORD_{uv_set}", where)
         sampler = document.get("samplers", item["sampler"]) if "sampler" in item else {}
-        codes = self._image(item["source"])
-        if codes is None:
+        image = self._image(item["source"], where, instead)
+        if image is None:
             return None
         return Texture(
-            codes,
+            image,
             wrap=(_wrap(sampler, "wrapS"), _wrap(sampler, "wrapT")),
             filter=self._filter(sampler, where),
             transform=_uv_matrix(document, move, where) if move else None,
@@ -86,38 +90,42 @@ class GltfMaterials:
             self._document.lose("minFilter (magFilter counts at all distances)", where)
         return "nearest" if NEAREST in ((far,) if near is None else (near,)) else "bilinear"
 
-    def _image(self, index: int) -> NDArray[Any] | None:
-        """Return the stored values of an image, (H, W, C), decoded once; None if its file is missing."""
+    def _image(self, index: int, where: str, instead: StoredImage | None) -> StoredImage | None:
+        """Return an image, decoded once, or `instead`, which is noted, if it cannot be read."""
         item = self._document.get("images", index)
         if index not in self._images:
-            self._images[index] = self._decoded(item, f"images[{index}]")
-        return self._images[index]
+            read = lambda: self._decoded(item, f"images[{index}]")  # noqa: E731
+            found = self._document.files.shown(_called(item, index), read, where, instead)
+            self._images[index] = None if found is instead else found
+        return self._images[index] or instead
 
-    def _decoded(self, item: dict[str, Any], place: str) -> NDArray[Any] | None:
+    def _decoded(self, item: dict[str, Any], place: str) -> StoredImage:
         document = self._document
+        files, uri = document.files, item.get("uri")
         name = f"{document.name}: {place}" + (f" {item['name']!r}" if "name" in item else "")
-        uri = item.get("uri")
         if "bufferView" in item:
             data, start, end, _ = document.view(item["bufferView"])
-            content = data[start:end]
-        elif isinstance(uri, str):
-            with document.inside(place):
-                if document.is_missing(uri):
-                    document.lose(f"texture {uri!r}, which is missing", place)
-                    return None
-            content = document.uri(uri, place)
-            name = name if uri.startswith("data:") else f"{name} ({uri})"
-        else:
+            image = files.decoded(name, data[start:end])
+        elif not isinstance(uri, str):
             raise SceneError(f"{name} has neither a uri nor a bufferView")
-        limits = document.files.limits
-        codes = decode_codes(content, name, document.files.budget)
-        self._pixels += codes.shape[0] * codes.shape[1]
-        if self._pixels > IMAGES * limits.pixels:
+        elif uri.startswith("data:"):
+            image = files.decoded(name, document.uri(uri, place))
+        else:
+            image = files.stored(files.find(uri))
+        self._pixels += image.codes.shape[0] * image.codes.shape[1]
+        if self._pixels > IMAGES * files.limits.pixels:
             raise LimitError(
                 f"{name} brings the images to {self._pixels} pixels in all; "
-                f"the limit is {IMAGES * limits.pixels}"
+                f"the limit is {IMAGES * files.limits.pixels}"
             )
-        return codes
+        return image
+
+
+def _called(item: dict[str, Any], index: int) -> str:
+    """Return what messages call an image."""
+    uri = item.get("uri")
+    known = uri if isinstance(uri, str) and not uri.startswith("data:") else item.get("name")
+    return f"images[{index}]" if known is None else str(known)
 
 
 class _Reader:
@@ -172,10 +180,12 @@ class _Reader:
             )
         return value
 
-    def _texture(self, group: dict[str, Any], key: str, **arguments: Any) -> Texture | None:
-        return (
-            self._materials.texture(group[key], f"{self._where}.{key}", **arguments) if key in group else None
-        )
+    def _texture(
+        self, group: dict[str, Any], key: str, instead: StoredImage | None = None, **arguments: Any
+    ) -> Texture | None:
+        if key not in group:
+            return None
+        return self._materials.texture(group[key], f"{self._where}.{key}", instead, **arguments)
 
     def _scalar(self, group: dict[str, Any], factor: str, texture: str, channel: int, default: float) -> Any:
         """Return a factor, or the texture that it scales."""
@@ -189,7 +199,7 @@ class _Reader:
 
     def _metallic_roughness(self, group: dict[str, Any]) -> None:
         factor = self._color(group, "baseColorFactor", [1.0, 1.0, 1.0, 1.0])
-        base = self._texture(group, "baseColorTexture", scale=factor[:3])
+        base = self._texture(group, "baseColorTexture", GRAY, scale=factor[:3])
         self._wanted["base_color"] = factor[:3] if base is None else base
         self._alpha(group, "baseColorTexture", float(factor[3]), base)
         metallic = self._scalar(group, "metallicFactor", "metallicRoughnessTexture", 2, 1.0)
@@ -209,7 +219,7 @@ class _Reader:
         varying = self._texture(group, map_key, scale=specular)
         if varying is None:
             diffuse[:3] *= 1 - specular.max()
-        base = self._texture(group, "diffuseTexture", scale=diffuse[:3])
+        base = self._texture(group, "diffuseTexture", GRAY, scale=diffuse[:3])
         self._alpha(group, "diffuseTexture", float(diffuse[3]), base)
         color: Any = diffuse[:3] if base is None else base
         self._wanted["base_color"] = color if varying is None else BesideSpecular(color, varying)
@@ -217,7 +227,7 @@ class _Reader:
         self._wanted["roughness"] = 1 - glossiness
         if varying is not None:
             self._wanted["specular_color"] = self._texture(group, map_key, scale=specular / F0)
-            if varying.channels == 4:
+            if varying.has_alpha:
                 self._wanted["roughness"] = self._texture(
                     group, map_key, srgb=False, channel=3, scale=-glossiness, offset=1.0
                 )
@@ -234,7 +244,7 @@ class _Reader:
         if mode == "MASK":
             self._cutoff = self._number(self._item, "alphaCutoff", 0.5, high=np.inf)
         alpha: Any = factor
-        if base is not None and base.channels == 4:
+        if base is not None and base.has_alpha:
             alpha = self._texture(group, key, srgb=False, channel=3, scale=factor)
         self._alpha_given = alpha
         self._want("alpha", alpha, 1.0)
@@ -319,7 +329,7 @@ class _Reader:
             self._lost.append("iridescenceFactor or a texture of it (a film is everywhere)")
         thick = self._number(group, "iridescenceThicknessMaximum", 400.0, high=1e5)
         thin = self._number(group, "iridescenceThicknessMinimum", 100.0, high=1e5)
-        spread = {"srgb": False, "channel": 1, "scale": thick - thin, "offset": thin}
+        spread: dict[str, Any] = {"srgb": False, "channel": 1, "scale": thick - thin, "offset": thin}
         texture = self._texture(group, "iridescenceThicknessTexture", **spread)
         self._want("film_thickness", thick if texture is None else texture, 0.0)
         if "film_thickness" in self._wanted:
@@ -347,6 +357,8 @@ class _Reader:
         if not factor.any():
             return None
         texture = self._texture(self._item, "emissiveTexture", scale=factor)
+        if texture is None and "emissiveTexture" in self._item:  # most such images are dark
+            return None
         return factor if texture is None else texture
 
 

@@ -22,7 +22,7 @@ from ..textures.image import Texture
 from ..textures.normal_map import NormalMap
 from .losses import Losses
 from .pbrt.textures import computed
-from .sources import LoadLimits, PathLike, SceneFiles, checked_limits, folders
+from .sources import GRAY, LoadLimits, PathLike, SceneFiles, checked_limits, folders
 from .xml_checks import look_through
 
 Value = Any  # a number, a color (3,), a text, a texture, or a normal map
@@ -385,9 +385,10 @@ class _Document:
             where = texcoord.getConnectedNode()
             if where.getCategory() != "texcoord" or where.getInput("index") is not None:
                 raise Lost(f"{where.getCategory()} {where.getName()!r}")
-        pixels = self.files.image(self.files.find(reference))
-        if channel is not None and channel >= pixels.shape[2]:
-            channel = 0
+        instead = GRAY if channel is None else None
+        picture = self.files.picture(reference, place=node.getName(), instead=instead)
+        if picture is None:
+            raise Lost(f"the image {reference!r}, which cannot be read")
         tiled = node.getCategory() == "tiledimage"
         (u, v), (du, dv) = (value("uvtiling"), value("uvoffset")) if tiled else ((1, 1), (0, 0))
         transform = None if (u, v, du, dv) == (1, 1, 0, 0) else [[u, 0, -du], [0, v, -dv], [0, 0, 1]]
@@ -397,7 +398,7 @@ class _Document:
             raise Lost(f"image {node.getName()!r} with a constant outside")
         closest = (mode := node.getInput("filtertype")) is not None and mode.getValueString() == "closest"
         return Texture(
-            pixels,
+            picture,
             srgb=space == "srgb_texture",
             wrap=tuple(wraps),  # type: ignore[arg-type]
             filter="nearest" if closest else "bilinear",

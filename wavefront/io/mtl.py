@@ -24,7 +24,9 @@ How an MTL material is read:
   units. But an image that looks like a normal map is one, because Blender writes normal maps so, and `-bm` is
   then its strength.
 - `Ns` affects only the gloss, and `Ni` only glass.
-- A map whose image is missing is left out with a warning.
+- An image that is missing or damaged is noted. `map_Kd` is gray then, and other maps are left out; so is the
+  emission of a `map_Ke`.
+- `map_d` counts by the alpha of its image, and by its luminance where it has none.
 - Images are sRGB where they are colors, data elsewhere. The options -s -o -clamp -mm -imfchan -bm are read.
 
 All other properties of a file are named in one warning.
@@ -35,22 +37,20 @@ from __future__ import annotations
 import os
 from collections.abc import Callable
 from dataclasses import dataclass, field
-from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ..arrays.vec import Doubles
 from ..bsdfs import Dielectric, Diffuse, Mirror
 from ..core.errors import SceneError, exact, printable
 from ..materials import Material
-from ..textures.image import StoredImage, Texture
+from ..textures.image import Texture
 from ..textures.normal_map import BaseNormalMap, BumpMap, NormalMap
 from ..textures.parameter import MAX_INDEX
 from .appearance import MaterialSpec, build_material
 from .losses import Losses
-from .sources import SceneFiles
+from .sources import GRAY, SceneFiles
 
 # values of `illum`
 GLASS = (4, 6, 7, 9)
@@ -94,7 +94,7 @@ class Entry:
     lines: dict[str, tuple[str, int, str]] = field(default_factory=dict)
     read: set[str] = field(default_factory=set)  # keywords that the material uses
     idle_options: set[str] = field(default_factory=set)  # options of maps that are not honored
-    images: dict[str, NDArray[np.uint8]] = field(default_factory=dict)  # maps that were read already
+    images: dict[str, Any] = field(default_factory=dict)  # of maps: arrays, or a `StoredImage`
     files: SceneFiles | None = None  # None where all maps were read already
     losses: Losses = field(default_factory=lambda: Losses(""))
 
@@ -157,9 +157,8 @@ class Entry:
         transform = self._placing(key, options)
         channel = self._channel(key, options) if kind == "scalar" else None
         try:
-            source: Any = self.images[key] if key in self.images else self._image(name)
             return Texture(
-                source,
+                self.images[key],
                 srgb=kind == "color",
                 wrap="clamp" if options.get("-clamp") == ["on"] else "repeat",
                 transform=transform,
@@ -170,18 +169,23 @@ class Entry:
         except SceneError as error:
             raise SceneError(f"{self.where(key)}: {error}") from error
 
-    def _image(self, name: str) -> StoredImage:
-        """Return the image of the file in a line."""
-        files = self.files or SceneFiles(self.file)
-        path = files.find(name, self.file)
-        return StoredImage(files.image(path), path.name)
-
-    def find(self, key: str, name: str) -> Path:
-        """Return the path of the file in a line."""
+    def read_image(self, key: str) -> None:
+        """Read the image of a map, unless that was done; without one the map is left out, or gray."""
+        name = _map(self, key)[1]
+        if not name or key in self.images:
+            return
+        files = self.files or SceneFiles(self.file, losses=self.losses)
+        instead = GRAY if key == "map_kd" else None
         try:
-            return (self.files or SceneFiles(self.file)).find(name, self.file)
+            image = files.picture(name, self.file, self.where(key), instead)
         except SceneError as error:
             raise SceneError(f"{self.where(key)}: {error}") from error
+        if image is not None:
+            self.images[key] = image
+            return
+        del self.lines[key]
+        if key == "map_ke":
+            self.lines.pop("ke", None)
 
     def multiplier(self, key: str) -> float:
         """Return the option -bm of a map."""
@@ -211,8 +215,12 @@ class Entry:
         return np.array([[scale[0], 0, offset[0]], [0, scale[1], offset[1]], [0, 0, 1]])
 
     def _channel(self, key: str, options: dict[str, list[str]]) -> Any:
-        """Return the channel of the image by -imfchan: a number, or "luminance" without it."""
-        word = options.get("-imfchan", ["l"])[0]
+        """Return the channel of the image by -imfchan: a number, or "luminance".
+
+        By default it is alpha for `map_d`, where there is one, and "luminance".
+        """
+        has_alpha = key == "map_d" and self.images[key].codes.shape[2] in (2, 4)
+        word = options.get("-imfchan", ["m" if has_alpha else "l"])[0]
         if word not in CHANNELS:
             raise SceneError(
                 f"{self.where(key)}: -imfchan is {word!r}; it must be one of {', '.join(CHANNELS)}"
@@ -291,7 +299,8 @@ def specs(entries: dict[str, Entry], losses: Losses) -> dict[str, MaterialSpec]:
 
 def spec(entry: Entry) -> MaterialSpec:
     """Convert one entry to a material; the keywords that it uses are added to `entry.read`."""
-    _leave_out_missing(entry)
+    for key in [key for key in entry.lines if key in MAPS]:
+        entry.read_image(key)
     factor = entry.color("ke", 0.0, high=np.inf)
     if "map_ke" in entry.lines and not factor.any():
         factor = np.ones(3)
@@ -300,15 +309,6 @@ def spec(entry: Entry) -> MaterialSpec:
     material, lost = _material(entry)
     material.normal_map = _normal_or_bump_map(entry)
     return MaterialSpec(material, radiance, lost=lost)
-
-
-def _leave_out_missing(entry: Entry) -> None:
-    """Warn of maps whose files are missing; the material is read without them."""
-    for key in [key for key in entry.lines if key in MAPS and key not in entry.images]:
-        name = _map(entry, key)[1]
-        if name and not os.path.exists(entry.find(key, name)):
-            entry.losses.note(f"texture {name!r}", entry.where(key), "missing", "left out")
-            del entry.lines[key]
 
 
 def _material(entry: Entry) -> tuple[Material, list[str]]:

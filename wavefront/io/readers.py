@@ -8,7 +8,7 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any, TypeAlias
 
-from ..core.errors import SceneError
+from ..core.errors import SceneError, passed_limit
 from ..core.files import decode_text, extension_of
 from ..core.plural import plural
 from ..core.registry import Registry
@@ -109,8 +109,15 @@ def _libraries(files: SceneFiles, libraries: list[str]) -> dict[str, MaterialSpe
     """Read the material files; note missing ones."""
     specs: dict[str, MaterialSpec] = {}
     for library in dict.fromkeys(libraries):
-        file = files.find(library)
-        if not os.path.exists(file):  # also False for invalid names
+        try:
+            file = files.find(library)
+            found = os.path.exists(file)  # also False for invalid names
+        except SceneError as error:
+            if passed_limit(error):
+                raise
+            files.losses.note(f"material file {library!r}: {files.brief(error)}", done="left out")
+            continue
+        if not found:
             files.losses.note(f"material file {library!r}", value="missing", done="left out")
             continue
         entries = mtl.parse(file, decode_text(files.read(file)), files.losses, files)

@@ -5,24 +5,28 @@ from __future__ import annotations
 import gzip
 import os
 import zlib
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field, fields
 from io import BytesIO
 from pathlib import Path
 from typing import Any
+from urllib.parse import unquote
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ..codecs.archive import PIECE
 from ..codecs.budget import MEMORY_BYTES, Budget
-from ..codecs.images import read_codes
-from ..core.errors import LimitError, SceneError
+from ..codecs.images import decode_codes, read_codes
+from ..core.errors import LimitError, SceneError, passed_limit
 from ..core.files import MAX_BYTES, MAX_PIXELS, check_regular, path_name, read_bytes
-from ..core.references import GZIPPED, followed
+from ..core.references import GZIPPED, elsewhere, followed
+from ..textures.image import StoredImage, checked
 from .losses import Losses
 
 PathLike = str | os.PathLike[str]
+MISSING = "missing"
+GRAY = StoredImage(np.full((1, 1, 3), 0.5, np.float32), "gray")  # in place of an image that is missing
 
 MOST_DEFLATED = 1032  # bytes that a byte of deflate stands for at most
 MAX_TRIANGLES = 2**26  # of all meshes of a file by default
@@ -136,25 +140,118 @@ class SceneFiles:
         """The path of the scene file, for messages."""
         return os.fspath(self.scene)
 
-    def find(self, reference: str, base: PathLike | None = None) -> Path:
-        """Return the path of a file that the scene refers to by a relative name.
+    def find(
+        self, reference: str, base: PathLike | None = None, folders: Sequence[Path] | None = None
+    ) -> Path:
+        """Return the path of a file that the scene refers to.
 
         It is looked for in the folder of `base`, by default the scene file, and then in the search paths; the
-        path is that of the first place where it exists, or else the first allowed one.
+        path is that of the first place where it exists. If there is none, the last parts of the name are
+        looked for in these folders, as names may be those of the author's disk; this is noted. Else it is the
+        first allowed path.
+
+        Parameters
+        ----------
+        reference
+            The name in the file.
+        base
+            The file that has it.
+        folders
+            In place of the folder of `base`.
 
         Raises
         ------
         SceneError
-            If the name is a URI, absolute, or leads out of all folders, or the file is too large or
-            not a regular one.
+            If there is none and the name is a URI, absolute, or leads out of all folders; or if the file is
+            too large or not a regular one.
         """
         source = self.scene if base is None else base
         roots = [_folder(self.scene), *(each.resolve() for each in self.search_paths)]
-        allowed = followed(source, reference, (_folder(source), *roots[1:]), roots)
+        places = [
+            *([_folder(source)] if folders is None else (each.resolve() for each in folders)),
+            *roots[1:],
+        ]
+        try:
+            allowed, refused = followed(source, reference, places, roots), None
+        except SceneError as error:
+            allowed, refused = [], error
         found = next((path for path in allowed if os.path.exists(path)), None)
+        if found is None and (found := elsewhere(source, reference, places, roots)) is not None:
+            self._note_found(reference, source, found)
         if found is not None:
             check_regular(found, self.limits.file_bytes)
-        return found or allowed[0]
+            return found
+        if refused is not None:
+            raise refused
+        return allowed[0]
+
+    def _note_found(self, reference: str, source: PathLike, found: Path) -> None:
+        """Note that a file was found under another name, unless the name is only written as in a URI."""
+        name = unquote(reference.replace("\\", "/")).removeprefix("./")
+        if not os.fspath(found).endswith(f"/{name}"):
+            place = "" if source == self.scene else os.fspath(source)
+            self.losses.note(f"the file {reference!r}", place, "missing", f"{found.name!r} in its place")
+
+    def picture(
+        self,
+        reference: str,
+        base: PathLike | None = None,
+        place: str = "",
+        instead: StoredImage | None = None,
+    ) -> StoredImage | None:
+        """Return an image that the scene refers to; arguments as of `find` and `shown`."""
+        return self.shown(reference, lambda: self.stored(self.find(reference, base)), place, instead)
+
+    def shown(
+        self,
+        reference: str,
+        read: Callable[[], StoredImage],
+        place: str = "",
+        instead: StoredImage | None = None,
+    ) -> StoredImage | None:
+        """Return an image; that it is missing or damaged costs no more than the image.
+
+        Parameters
+        ----------
+        reference
+            What the scene calls it.
+        read
+            Returns it, or raises a SceneError.
+        place
+            Where the scene refers to it, for the note of the loss.
+        instead
+            What is returned then.
+
+        Raises
+        ------
+        SceneError
+            If a limit is passed.
+        """
+        try:
+            return checked(read())
+        except SceneError as error:
+            if passed_limit(error):
+                raise
+            what, why = f"texture {reference!r}", self.brief(error)
+            part, value = (what, why) if why == MISSING else (f"{what}: {why}", "")
+            done = "left out" if instead is None else "gray in its place"
+            self.losses.note(part, place, value, done)
+        return instead
+
+    def brief(self, error: SceneError) -> str:
+        """Return what an error says, without the folder of the scene."""
+        folder = os.path.join(os.path.dirname(self.name), "")
+        return str(error).replace(folder, "") if folder else str(error)
+
+    def stored(self, path: Path) -> StoredImage:
+        """Return the image in a file."""
+        if not os.path.exists(path):  # also False for invalid names
+            raise SceneError(MISSING)
+        return StoredImage(self.image(path), path.name)
+
+    def decoded(self, name: str, data: bytes) -> StoredImage:
+        """Return the image in a part of a file."""
+        return StoredImage(decode_codes(data, name, self.budget), name)
 
     def seen_from(self, path: PathLike) -> SceneFiles:
         """Return the files that a file of the scene may read; budget and losses are those of the scene."""

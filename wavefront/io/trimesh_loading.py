@@ -2,19 +2,18 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Iterator
 from contextlib import contextmanager
 from io import BytesIO
 from typing import Any
-from urllib.parse import unquote
 
 import numpy as np
+from numpy.typing import NDArray
 
-from ..codecs.images import decode_codes
+from ..codecs.encoding import to_codes
 from ..core.errors import SceneError
 from ..core.interrupt import repeated_ctrl_c
-from .sources import SceneFiles
+from .sources import GRAY, SceneFiles
 from .trimesh_import import import_trimesh
 
 
@@ -23,32 +22,38 @@ class Images:
 
     def __init__(self, files: SceneFiles) -> None:
         self.files = files
-        self.missing: list[str] = []
         self.error: SceneError | None = None
+        self._found: dict[str, bytes] = {}
 
     def get(self, reference: str) -> bytes:
-        """Return the content of an image, after checking that it can be decoded."""
-        try:
-            file = self.files.find(reference)
-            if not os.path.exists(file):
-                file = self.files.find(unquote(reference))
-            if os.path.exists(file):
-                content = self.files.read(file)
-                name = f"{self.files.name}: texture {reference!r}"
-                decode_codes(content, name, self.files.budget)
-                return content
-        except SceneError as error:
-            self.error = self.error or error
-            raise
-        self.missing.append(reference)
-        raise FileNotFoundError(reference)
+        """Return an image as a png, which is gray where it is missing or damaged."""
+        if reference not in self._found:
+            try:
+                picture = self.files.picture(reference, instead=GRAY)
+            except SceneError as error:
+                self.error = self.error or error
+                raise
+            assert picture is not None
+            self._found[reference] = _as_png(picture.codes)
+        return self._found[reference]
 
     def report(self) -> None:
-        """Note missing images; raise the first error that trimesh ignored."""
+        """Raise the first error that trimesh ignored."""
         if self.error is not None:
             raise self.error
-        for name in dict.fromkeys(self.missing):
-            self.files.losses.note(f"texture {name!r}", value="missing", done="left out")
+
+
+def _as_png(codes: NDArray[Any]) -> bytes:
+    """Return a png of 8 bits."""
+    from PIL import Image  # imported here to keep `import wavefront` quick
+
+    if codes.dtype == np.float32:
+        codes = to_codes(codes, "srgb")
+    elif codes.dtype == np.uint16:
+        codes = (codes >> 8).astype(np.uint8)
+    out = BytesIO()
+    Image.fromarray(codes[..., 0] if codes.shape[2] == 1 else codes).save(out, "PNG", compress_level=1)
+    return out.getvalue()
 
 
 def by_trimesh(name: str, data: bytes, kind: str, images: Any = None, skip_materials: bool = False) -> Any:

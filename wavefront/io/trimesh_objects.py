@@ -9,10 +9,11 @@ from numpy.typing import NDArray
 
 from ..arrays.vec import f4
 from ..bsdfs import Diffuse
+from ..codecs.raster import codes_of
 from ..core.errors import SceneError, printable
 from ..materials import Material
 from ..shapes.transform import Matrix
-from ..textures.image import Texture
+from ..textures.image import StoredImage, Texture
 from ..textures.normal_map import NormalMap
 from . import mtl
 from .appearance import MaterialSpec, assign_material, build_material, from_srgb, is_faint
@@ -220,48 +221,49 @@ def _is_blank(material: Any) -> bool:
     image = getattr(material, "image", None)
     plain = getattr(material, "kwargs", None) == {} and material.name in (None, "", "material_0")
     return (
-        plain and image is not None and max(image.size) <= 2 and not np.ptp(_pixels(image), axis=(0, 1)).any()
+        plain
+        and image is not None
+        and max(image.size) <= 2
+        and not np.ptp(codes_of(image), axis=(0, 1)).any()
     )
 
 
-def _pixels(image: Any) -> NDArray[np.uint8]:
-    """Return the stored values (H, W, C) of a PIL image."""
-    if image.mode not in ("L", "LA", "RGB", "RGBA"):
-        image = image.convert("RGBA" if "transparency" in image.info else "RGB")
-    codes = np.asarray(image)
-    return codes[:, :, None] if codes.ndim == 2 else codes
+def _picture(image: Any) -> StoredImage:
+    """Return the stored values of a PIL image."""
+    return StoredImage(codes_of(image), "image")
 
 
 def _pbr(material: Any) -> MaterialSpec:
     """Read glTF's model; trimesh rounds its colors to 8 bits, and they are linear."""
     factor = np.ones(4) if material.baseColorFactor is None else np.asarray(material.baseColorFactor) / 255.0
     wanted: dict[str, Any] = {"base_color": factor[:3]}
-    codes = None if material.baseColorTexture is None else _pixels(material.baseColorTexture)
-    if codes is not None:
-        wanted["base_color"] = Texture(codes, scale=factor[:3])
+    base = None if material.baseColorTexture is None else _picture(material.baseColorTexture)
+    if base is not None:
+        wanted["base_color"] = Texture(base, scale=factor[:3])
     alpha: Any = None
     cutoff = None
     if material.alphaMode == "MASK":
         cutoff = 0.5 if material.alphaCutoff is None else float(material.alphaCutoff)
     if material.alphaMode in ("MASK", "BLEND"):
         alpha = float(factor[3])
-        if codes is not None and codes.shape[2] == 4:
-            alpha = Texture(codes, srgb=False, channel=3, scale=alpha)
+        if base is not None and base.codes.shape[2] in (2, 4):
+            alpha = Texture(base, srgb=False, channel=3, scale=alpha)
         if isinstance(alpha, Texture) or alpha != 1:
             wanted |= {"alpha": alpha, "alpha_cutoff": cutoff}
     metallic = 1.0 if material.metallicFactor is None else float(material.metallicFactor)
     roughness = 1.0 if material.roughnessFactor is None else float(material.roughnessFactor)
-    both = None if material.metallicRoughnessTexture is None else _pixels(material.metallicRoughnessTexture)
+    both = None if material.metallicRoughnessTexture is None else _picture(material.metallicRoughnessTexture)
     if metallic:
         wanted["metallic"] = metallic if both is None else Texture(both, False, channel=2, scale=metallic)
     wanted["roughness"] = roughness if both is None else Texture(both, False, channel=1, scale=roughness)
     glow = np.zeros(3) if material.emissiveFactor is None else np.asarray(material.emissiveFactor, np.float64)
     radiance: Any = glow if glow.any() else None
     if radiance is not None and material.emissiveTexture is not None:
-        radiance = Texture(_pixels(material.emissiveTexture), scale=glow)
+        radiance = Texture(_picture(material.emissiveTexture), scale=glow)
     normal_map = None
-    if material.normalTexture is not None:  # trimesh does not keep its scale
-        normal_map = NormalMap(Texture(_pixels(material.normalTexture), False))
+    bumps = material.normalTexture  # trimesh does not keep its scale
+    if bumps is not None and bumps.size != (1, 1):  # which is even, or in place of a missing image
+        normal_map = NormalMap(Texture(_picture(bumps), False))
     made, lost = build_material(wanted, normal_map)
     occluded = ["occlusionTexture"] if material.occlusionTexture is not None else []
     return MaterialSpec(made, radiance, bool(material.doubleSided), occluded + lost, alpha, cutoff)
@@ -279,7 +281,7 @@ def _simple(material: Any, where: str, bare: bool, losses: Losses) -> MaterialSp
         words = value if isinstance(value, list | tuple | np.ndarray) else [value]
         entry.lines[key.lower()] = (key, 0, " ".join(str(word) for word in words))
     if material.image is not None:
-        entry.images["map_kd"] = _pixels(material.image)
+        entry.images["map_kd"] = _picture(material.image)
         entry.lines["map_kd"] = ("map_kd", 0, "image")
     # of the other images trimesh keeps only the names, without a folder
     gone = [key for key in entry.lines if _is_map(key) and key not in entry.images]

@@ -76,7 +76,7 @@ class Texture(BaseTexture):
     @suggests_keywords
     def __init__(
         self,
-        source: str | os.PathLike[str] | ArrayLike,
+        source: str | os.PathLike[str] | ArrayLike | StoredImage,
         srgb: bool = True,
         *,
         wrap: Wrap | tuple[Wrap, Wrap] = "repeat",
@@ -220,6 +220,17 @@ class StoredImage(NamedTuple):
 
     codes: NDArray[Any]  # (H, W, C) as stored
     name: str
+
+
+def checked(image: StoredImage) -> StoredImage:
+    """Return an image that a `Texture` can show.
+
+    Raises
+    ------
+    SceneError
+        If it has another shape or type, or values that are not finite.
+    """
+    return StoredImage(_checked(image.codes, image.name), image.name)
 
 
 def _codes(source: Any, max_pixels: int) -> tuple[NDArray[Any], str, bool]:

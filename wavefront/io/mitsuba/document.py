@@ -96,16 +96,13 @@ class Document:
 
     def find(self, reference: str) -> Path:
         """Return the path of a file that the scene refers to: in its folder, or in one of a `<path>`."""
-        refused: SceneError | None = None
-        for folder in reversed(self.folders):
-            try:
-                found = self._files.find(reference, folder / "_")
-            except SceneError as error:
-                refused = refused or SceneError(str(error).removeprefix(f"{folder / '_'}: "))
-                continue
-            if found.exists():
-                return found
-        raise refused or SceneError(f"file {reference!r} is missing")
+        try:
+            found = self._files.find(reference, folders=self.folders[::-1])
+        except SceneError as error:
+            raise SceneError(str(error).removeprefix(f"{self._files.name}: ")) from error
+        if not os.path.exists(found):  # also False for invalid names
+            raise SceneError(f"file {reference!r} is missing")
+        return found
 
     def _read(self, path: Path, data: bytes, depth: int) -> Element:
         root = parsed(os.fspath(path), data)
@@ -215,7 +212,7 @@ class Document:
     def _add_folder(self, name: str, tag: Tag, path: Path) -> None:
         """Add a folder in which files are looked for; whether they may be read is checked then."""
         places = [each / name.replace("\\", "/") for each in (path.parent, *reversed(self.folders))]
-        folder = next((place for place in places if place.is_dir()), None)
+        folder = next((place for place in places if os.path.isdir(place)), None)
         if folder is None:
             raise SceneError(f"{tag.place}: path is {name!r}; there is no such folder")
         self.folders.append(folder)

@@ -215,7 +215,7 @@ def pixels(node: Node, job: Job) -> NDArray[Any]:
             if values.ndim not in (2, 3) or values.dtype.kind not in "uf":
                 raise SceneError(f"{name} is {in_brief(node.get(name))}; it must be an image")
             return values
-    return job.files.image(job.find(node.text("filename")))
+    return job.picture(node, node.text("filename")).codes
 
 
 @plugin(

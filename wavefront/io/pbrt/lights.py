@@ -143,7 +143,7 @@ def _area(entity: Entity, job: Job) -> tuple[Any, float, bool]:
 
 def _pixels(entity: Entity, job: Job) -> Floats:
     """Return the linear colors of an image, (H, W, 3)."""
-    codes = job.files.image(job.find(entity.text("filename", "")))
+    codes = job.picture(entity, entity.text("filename", "")).codes
     pixels = codes_to_linear(codes) if codes.dtype.kind == "u" else codes.astype(np.float32)
     pixels = pixels[..., :3] if pixels.shape[2] >= 3 else np.repeat(pixels[..., :1], 3, 2)
     if not np.isfinite(pixels).all():

@@ -67,7 +67,7 @@ def _made(entity: Entity, bsdf: Any, job: Job) -> Material:
     bumps: Any = None
     file = entity.text("normalmap", "")
     if file:
-        bumps = NormalMap(Texture(job.files.image(job.find(file)), srgb=False))
+        bumps = NormalMap(Texture(job.picture(entity, file), srgb=False))
     height = scalar(entity, "displacement", 0.0, job)
     if isinstance(height, Texture) and not file:
         heights = copy(height)

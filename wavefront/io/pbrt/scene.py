@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -298,7 +299,7 @@ def read_scene(files: SceneFiles, data: bytes, read_mesh: Callable[[Path], list[
 
     def find(reference: str) -> Path:
         path = files.find(reference)
-        if not path.exists():
+        if not os.path.exists(path):  # also False for invalid names
             raise SceneError(f"file {reference!r} is missing")
         return path
 

@@ -12,7 +12,7 @@ from ...arrays.state import SurfaceInteraction
 from ...arrays.vec import Doubles, Floats, dot, f4
 from ...core.errors import SceneError
 from ...textures.base import BaseTexture
-from ...textures.image import UV_SETS, Texture
+from ...textures.image import UV_SETS, StoredImage, Texture
 from .entities import Entity, Job, converts, unsupported
 from .mappings import Mapped, MappedTexture, Mapping, mapping_of
 from .noise import noise
@@ -248,9 +248,9 @@ def inside_dots(s: Any, t: Any) -> Any:
 
 def image(entity: Entity, job: Job, channel: str | None) -> Texture:
     """Return an image texture."""
-    path = job.find(entity.text("filename", ""))
-    codes = job.files.image(path)
-    encoding = entity.text("encoding", "sRGB" if path.suffix.lower() == ".png" else "linear")
+    file = entity.text("filename", "")
+    codes, name = job.picture(entity, file)
+    encoding = entity.text("encoding", "sRGB" if file.lower().endswith(".png") else "linear")
     if codes.dtype.kind == "u" and encoding.startswith("gamma"):
         exponent = _exponent(encoding)
         codes = (codes / np.float32(np.iinfo(codes.dtype).max)).astype(np.float32) ** np.float32(exponent)
@@ -262,7 +262,7 @@ def image(entity: Entity, job: Job, channel: str | None) -> Texture:
     kind = entity.choice("filter", "bilinear", ("bilinear", "point", "trilinear", "ewa", "EWA"))
     mapping = mapping_of(entity, job)
     texture = MappedTexture(
-        codes,
+        StoredImage(codes, name),
         srgb=encoding == "sRGB",
         wrap="clamp" if wrap == "black" else wrap,  # type: ignore[arg-type]
         filter="nearest" if kind == "point" else "bilinear",

@@ -15,6 +15,7 @@ from ...shapes.transform import Matrix
 from ...textures import Texture
 from ..placing import moved_raw
 from ..repair import build
+from ..sources import GRAY
 from ..surfaces import revolved, slope
 from .gprims import along
 from .materials import Materials
@@ -104,8 +105,8 @@ def _dome(lamp: Lamp) -> Light:
         lamp.lose("inputs:texture:format; 'latlong' in its place")
     if file is None:
         return Environment(bright)
-    image = lamp.materials.pixels(lamp.prim, file)
-    return Environment(1 if image is None else image, transform=lamp.axes, scale=bright)
+    image = lamp.materials.pixels(lamp.prim, file) or GRAY
+    return Environment(image.codes, transform=lamp.axes, scale=bright)
 
 
 def _ball(lamp: Lamp) -> Light | Shape:

@@ -12,14 +12,14 @@ import numpy as np
 
 from ...arrays.elementary import sin_cos_turns
 from ...bsdfs import Diffuse, Principled
-from ...codecs.images import decode_codes
 from ...core.errors import LimitError, SceneError
 from ...materials import Material
 from ...textures import NormalMap, Texture, VertexColors
 from ...textures.base import BaseTexture
+from ...textures.image import StoredImage
 from ..gltf_specular_glossiness import F0
 from ..repair import RawMesh
-from ..sources import SceneFiles
+from ..sources import MISSING, SceneFiles
 
 WRAPS = {"repeat": "repeat", "clamp": "clamp", "mirror": "mirror", "useMetadata": "repeat"}
 NUMBERS = {  # theirs, ours and the default
@@ -77,38 +77,37 @@ class Materials:
         self.lose(bound.GetPrim(), "its surface shader; a gray Diffuse in its place")
         return Look(Material(Diffuse(0.5), name=bound.GetPrim().GetName()))
 
-    def pixels(self, prim: Any, file: Any) -> Any:
-        """Return the values of an image, which may be in a usdz archive, or None if it is missing."""
+    def pixels(self, prim: Any, file: Any) -> StoredImage | None:
+        """Return an image, which may be in a usdz archive, or None, which is noted, if it cannot be read."""
         if not hasattr(file, "resolvedPath"):  # a value of another type than the schema has
             raise SceneError(f"{prim.GetPath()}: file is {str(file)[:60]!r}; it must be an asset path")
         name = file.resolvedPath or file.path
-        try:
-            path = self._allowed(name.partition("[")[0])
-        except SceneError as error:
-            self.lose(prim, f"the image {file.path!r}: {str(error).removeprefix(f'{self.files.name}: ')}")
-            return None
         if name not in self._images:
-            self._images[name] = self._read(name, path)
-        if self._images[name] is None:
-            self.lose(prim, f"the image {file.path!r}, which is missing")
+            self._images[name] = self._read(file, str(prim.GetPath()))
         return self._images[name]
 
-    def _read(self, name: str, path: Path) -> Any:
-        if name.endswith("]"):  # in a usdz archive
-            from pxr import Ar
+    def _read(self, file: Any, place: str) -> StoredImage | None:
+        found = file.resolvedPath
+        if found.endswith("]"):  # in a usdz archive
+            read = lambda: self.files.decoded(found[:-1], self._member(found))  # noqa: E731
+            return self.files.shown(file.path, read, place)
+        return self.files.picture(self._inside(found) if found else file.path, place=place)
 
-            asset = Ar.GetResolver().OpenAsset(Ar.ResolvedPath(name))
-            if not asset:
-                return None
-            if asset.GetSize() > self.files.limits.file_bytes:
-                raise LimitError(f"{name}: has {asset.GetSize()} bytes; the limit is LoadLimits.file_bytes")
-            return decode_codes(bytes(asset.GetBuffer()), name[:-1], self.files.budget)
-        return self.files.image(path) if path.exists() else None
+    def _inside(self, path: str) -> str:
+        """Return a path as the scene would refer to it."""
+        return os.path.relpath(path, Path(self.files.name).resolve().parent)
 
-    def _allowed(self, name: str) -> Path:
-        """Return the path of a file that may be read."""
-        folder = Path(self.files.name).resolve().parent
-        return self.files.find(os.path.relpath(name, folder) if os.path.isabs(name) else name)
+    def _member(self, name: str) -> bytes:
+        """Return the content of an image in an archive, which may be read."""
+        from pxr import Ar
+
+        self.files.find(self._inside(name.partition("[")[0]))
+        asset = Ar.GetResolver().OpenAsset(Ar.ResolvedPath(name))
+        if not asset:
+            raise SceneError(MISSING)
+        if asset.GetSize() > self.files.limits.file_bytes:
+            raise LimitError(f"{name}: has {asset.GetSize()} bytes; the limit is LoadLimits.file_bytes")
+        return bytes(asset.GetBuffer())
 
 
 class _Surface:
