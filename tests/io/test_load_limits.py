@@ -172,12 +172,14 @@ def test_limits_are_limits(scene: Path) -> None:
 def test_many_materials_are_few_meshes_for_trimesh(calls_of: Callable[..., Any]) -> None:
     """Its time grows with the square of their number. Each material gets its own faces."""
     rng = np.random.default_rng(7)
-    points, texels = rng.random((300, 3)).round(6), rng.random((300, 2)).round(6)
+    turns = np.arange(300) * np.pi / 150
+    points = np.stack([np.cos(turns), np.sin(turns), 0 * turns], 1).round(6)
+    texels = rng.random((300, 2)).round(6)
     text = ["v {} {} {}".format(*point) for point in points] + ["vt {} {}".format(*texel) for texel in texels]
     expected: dict[str, tuple[list[int], bool]] = {}
     for number in range(400):
         width, textured = 3 + number % 2, number % 3 == 0
-        corners = rng.choice(300, width, replace=False)
+        corners = np.sort(rng.choice(300, width, replace=False))  # convex
         # an index that counts back, in some
         words = [str(i - 300 if number % 5 == 0 else i + 1) for i in corners]
         text += [f"usemtl m{number}", "f " + " ".join(f"{w}/{w}" if textured else w for w in words)]

@@ -160,36 +160,42 @@ CASES: dict[str, dict[str, tuple[Write, str]]] = {
         }.items()
     },
     "indices": {
-        "0": (text(POINTS + "f 0 1 2\n"), r"a\.obj line 4: f uses v 0; it must be in \[1, 3\]"),
-        "too large": (text(POINTS + "f 1 2 4\n"), r"a\.obj line 4: f uses v 4; it must be in \[1, 3\]"),
-        "too small": (text(POINTS + "f 1 2 -4\n"), r"a\.obj line 4: f uses v -4"),
+        "0": (text(POINTS + "f 0 1 2\n"), r"line 4: f is '0 1 2'; left out, as there is no v 0"),
+        "too large": (text(POINTS + "f 1 2 4\n"), r"line 4: f is .*; left out, as there is no v 4"),
+        "too small": (text(POINTS + "f 1 2 -4\n"), r"line 4: f is .*; left out, as there is no v -4"),
         "huge": (
             text(POINTS + "f 1 2 9999999999999999999\n"),
-            r"a\.obj line 4: f uses v 9999999999999999999",
+            r"line 4: f is .*; left out, as there is no v 9999999999999999999",
         ),
         "ply": (
             binary(PLY.format("binary_little_endian", 3, 1).encode() + PLY_BODY[:-4] + b"\3\0\0\0", "a.ply"),
-            r"a\.ply: .*index|a\.ply.*must be in",
+            r"a\.ply: has no faces: 1 row of face with a vertex beyond the 3",
         ),
         "gltf": (gltf(lambda json: json["accessors"][0].update(count=2)), r"a\.gltf: .*(index|indices|3)"),
-        "off": (text("OFF\n3 1 0\n0 0 0\n1 0 0\n0 1 0\n3 0 1 3\n", "a.off"), r"a\.off.* 3"),
+        "off": (
+            text("OFF\n3 1 0\n0 0 0\n1 0 0\n0 1 0\n3 0 1 3\n", "a.off"),
+            r"a\.off: has no faces: 1 row of face with a vertex beyond the 3",
+        ),
     },
     "short lines": {
-        "v": (text(FACE.replace("v 1 0 0", "v 1 0")), r"a\.obj line 2: v has 2 numbers"),
-        "f": (text(POINTS + "f 1 2\n"), r"a\.obj line 4: f has 2 corners"),
+        "v": (text(FACE.replace("v 1 0 0", "v 1 0")), r"a\.obj: line 2: v is '1 0'; 0 in place of the rest"),
+        "f": (text(POINTS + "f 1 2\n"), r"a\.obj: has no faces: line 4: f is '1 2'; left out"),
         "no faces": (text("vn 0 0 1\n"), r"a\.obj: has no faces"),
         "ply": (
             text(PLY.format("ascii", 3, 1) + "0 0 0\n1 0\n0 1 0\n3 0 1 2\n", "a.ply"),
-            r"a\.ply line 11: vertex has 2 words; it must have 3",
+            "1 row of vertex with too few or malformed words, first: line 11",
         ),
-        "truncated ply": (text(PLY.format("ascii", 3, 1) + "0 0 0\n1 0 0\n", "a.ply"), r"a\.ply: claims"),
+        "truncated ply": (
+            text(PLY.format("ascii", 3, 1) + "0 0 0\n1 0 0\n", "a.ply"),
+            "the last 1 row of vertex; missing",
+        ),
         "truncated stl": (
             text("solid\nfacet normal 0 0 1\nouter loop\nvertex 0 0 0\n", "a.stl"),
-            r"ends early",
+            "facet is 1 vertex; left out",
         ),
         "truncated binary stl": (
             binary(bytes(80) + struct.pack("<I", 2) + STL_FACET, "a.stl"),
-            r"a\.stl: claims 2 faces, 184 bytes; it has 134",
+            "the number of facets is 2, but the file has 134 bytes; 1 read",
         ),
         "truncated glb": (binary(b"glTF" + struct.pack("<II", 2, 500) + bytes(40), "a.glb"), r"a\.glb"),
         "truncated gltf": (text('{"asset": {"version": "2.0"}, "meshes": [', "a.gltf"), r"a\.gltf: .*JSON"),
@@ -275,11 +281,11 @@ CASES: dict[str, dict[str, tuple[Write, str]]] = {
     "counts": {
         "ply": (
             binary(PLY.format("binary_little_endian", 3, 2 * 10**9).encode() + PLY_BODY, "a.ply"),
-            r"a\.ply: claims 2000000000 rows of face, at least 2000000036 bytes; \d+ are there",
+            "the last 1999999999 rows of face; missing, as the file ends before",
         ),
         "ply vertices": (
             binary(PLY.format("binary_little_endian", 10**15, 1).encode() + PLY_BODY, "a.ply"),
-            r"a\.ply: claims 1000000000000000 rows of vertex",
+            r"a\.ply: has no faces:\s+the last \d+ rows of vertex; missing",
         ),
         "ply list": (
             binary(
@@ -290,7 +296,7 @@ CASES: dict[str, dict[str, tuple[Write, str]]] = {
         ),
         "stl": (
             binary(bytes(80) + struct.pack("<I", 2**32 - 1) + STL_FACET, "a.stl"),
-            r"a\.stl: claims 4294967295 faces",
+            "the number of facets is 4294967295, but the file has 134 bytes; 1 read",
         ),
         "off": (text("OFF\n3 2000000000 0\n0 0 0\n1 0 0\n0 1 0\n3 0 1 2\n", "a.off"), r"a\.off"),
         "gltf": (gltf(lambda json: json["accessors"][0].update(count=10**9)), r"a\.gltf: accessors\[0\]"),
@@ -323,7 +329,7 @@ CASES: dict[str, dict[str, tuple[Write, str]]] = {
         "line ends": (text(FACE.replace("\n", "\r\n")), OK),
         "name": (text(FACE, "caf\xe9 \u6f22.obj"), OK),
         "name that is not utf-8": (text(FACE, os.fsdecode(b"a\xff\xfe.obj")), OK),
-        "null bytes": (text(FACE + "\0\0\0"), r"a\.obj line 5"),
+        "null bytes": (text(FACE + "\0\0\0"), OK),
     },
 }
 
@@ -372,7 +378,16 @@ def outcomes() -> dict[str, list[str]]:
 
 
 # rows where a file may load without `strict`, though not where a limit of `LoadLimits` is passed
-REPAIRED = ("vertices", "zero area", "missing texture", "textures", "outside", "archives")
+REPAIRED = (
+    "vertices",
+    "zero area",
+    "missing texture",
+    "textures",
+    "outside",
+    "archives",
+    "short lines",
+    "counts",
+)
 LIMITS = ("bomb",)
 
 

@@ -34,7 +34,7 @@ from .messages import FAULT
 
 SECONDS = 10.0
 CHECKS_TAKE = 2.0  # seconds, about; the rest is for speed
-REQUIRED = ("numpy", "imageio", "trimesh", "OpenEXR", "tqdm", "threadpoolctl", "pycollada")
+REQUIRED = ("numpy", "imageio", "trimesh", "OpenEXR", "tqdm", "threadpoolctl", "pycollada", "mapbox_earcut")
 
 SIZE = (128, 128)
 FURNACE_SPP = 64

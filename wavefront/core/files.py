@@ -58,7 +58,10 @@ def check_regular(path: str | os.PathLike[str], limit: float = math.inf) -> None
 
 
 def decode_text(data: bytes) -> str:
-    """Return text from UTF-8 or UTF-16 (by its byte order mark), else Latin-1; line ends become \\n."""
+    """Return text from UTF-8 or UTF-16 (by its byte order mark), else Latin-1.
+
+    Line ends become \\n. What ends a file of DOS, Ctrl-Z and zeros, is left out.
+    """
     if data.startswith((b"\xff\xfe", b"\xfe\xff")):
         text = data.decode("utf-16", errors="replace")
     else:
@@ -66,7 +69,7 @@ def decode_text(data: bytes) -> str:
             text = data.decode("utf-8-sig")
         except UnicodeDecodeError:
             text = data.decode("latin-1")
-    return text.replace("\r\n", "\n").replace("\r", "\n")
+    return text.rstrip("\x1a\0").replace("\r\n", "\n").replace("\r", "\n")
 
 
 def check_size(height: int, width: int, most: float = MAX_PIXELS) -> None:

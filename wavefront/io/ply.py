@@ -1,147 +1,232 @@
-"""PLY, read by trimesh after a check of its header.
+"""PLY: meshes and points, with normals, texture coordinates, one texture, and colors of vertices or faces.
 
-Triangle strips, and polygons of several sizes in a binary file, are first rewritten as triangles: trimesh
-ignores strips and refuses such polygons.
+What is damaged is left out: faces of fewer than three corners or of vertices that do not exist, and the rows
+that a file lacks which ends early.
 """
 
 from __future__ import annotations
 
-import re
-from collections.abc import Iterator
-from dataclasses import replace
-from typing import Any, Literal
+from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
-from ..core.errors import SceneError
+from ..arrays.vec import Bools, Doubles, Ints
 from ..core.plural import plural
-from .ply_header import SIZES, TYPES, Element, check_ply, ply_textures, unread
-from .sources import SceneFiles
-from .trimesh_import import import_trimesh
-from .trimesh_loading import Images, by_trimesh
+from . import mtl
+from .appearance import MaterialSpec, assign_material, from_srgb, is_faint
+from .clouds import cloud
+from .contents import Contents
+from .losses import Losses
+from .placing import Places
+from .ply_header import RGB, read_header, unread
+from .ply_rows import Rows, read_rows
+from .polygons import fans_by_size, triangulate
+from .repair import RawMesh, Table, with_corners_apart
+from .sources import GRAY, SceneFiles
 
-FACES = ("face", "tristrips")
-ORDERS: dict[str, Literal["little", "big"]] = {"<": "little", ">": "big"}
+NAME = "geometry_0"  # of the mesh
+UVS = (("texture_u", "texture_v"), ("u", "v"), ("s", "t"))  # names of texture coordinates of vertices
 
 
-def parse(files: SceneFiles, data: bytes, materials: bool) -> tuple[Any, int]:
-    """Return the trimesh object of a PLY file, and the number of its faces by the header.
+class Parsed(NamedTuple):
+    """The content of a file, with all that it stores."""
+
+    contents: Contents
+    rows: dict[str, Rows]
+    row: Ints  # (m,) that of each triangle in `rows["face"]`
+
+
+class Faces(NamedTuple):
+    """Triangles of the faces of a file."""
+
+    triangles: Ints  # (m, 3) vertices
+    row: Ints  # (m,) of each
+    corner: Ints  # (m, 3) numbers of the corners, counted through all rows
+
+
+NONE = Faces(np.zeros((0, 3), np.intp), np.zeros(0, np.intp), np.zeros((0, 3), np.intp))
+
+
+def parse(files: SceneFiles, data: bytes, materials: bool) -> Parsed:
+    """Return the content of a PLY file.
 
     Raises
     ------
     SceneError
-        If the file is malformed. The message names the file, and the line of a text.
+        If its header is damaged. The message names the file and the line.
     """
-    name = files.name
-    elements = check_ply(name, data)
-    lost = unread(elements)
-    data, faces = _with_triangles(name, data, elements)
-    if faces is not None:
-        lost += [f"{what} of {faces.name}" for what in faces.properties if not what.startswith("vertex_ind")]
-        elements = [faces]
-    for each in lost if materials else ():
+    header = read_header(files.name, data)
+    rows = read_rows(header, data)
+    note_damage(files.losses, rows)
+    for each in unread(header.elements) if materials else ():
         files.losses.note(each)
-    textures = ply_textures(data)
-    if len(textures) > 1 and materials:
-        files.losses.note("several textures", done=f"{textures[-1]!r} is taken for all faces")
-    images = Images(files)
-    found = by_trimesh(name, data, "ply", images, skip_materials=not (textures and materials))
-    images.report()
-    return found, sum(element.count for element in elements if element.name == "face")
+    vertex = rows.get("vertex")
+    points = None if vertex is None else vertex.table("xyz")
+    if vertex is None or points is None:
+        return Parsed(Contents.once([]), rows, NONE.row)
+    if not any(each.count for each in header.elements if each.name in ("face", "tristrips")):
+        found = cloud(files.losses, points, _codes(vertex))
+        shapes = [] if found is None else [found]
+        return Parsed(Contents([], Places.once(0), shapes=shapes), rows, NONE.row)
+    points[bad_rows(vertex)] = np.nan
+    faces = _faces(files, rows, points)
+    raw = RawMesh(NAME, points, faces.triangles, normals=vertex.table(("nx", "ny", "nz")))
+    raw.uvs = next((uvs for names in UVS if (uvs := vertex.table(names)) is not None), None)
+    raw = _with_uvs_of_corners(files, raw, rows, faces)
+    spec = _textured(files, header.textures) if materials and raw.uvs is not None else None
+    raw = _colored(files, raw, rows, faces, spec is not None)
+    assign_material(raw, spec)
+    return Parsed(Contents.once([raw] if len(raw.faces) else []), rows, faces.row)
 
 
-def _with_triangles(name: str, data: bytes, elements: list[Element]) -> tuple[bytes, Element | None]:
-    """Return a file that trimesh can read, and the element that was rewritten, with its new count."""
-    found = [i for i, element in enumerate(elements) if element.name in FACES and element.count]
-    if not found or any(element.lists for element in elements[: found[0]]):
-        return data, None
-    if len(found) > 1:
-        raise SceneError(f"{name}: has faces and triangle strips; only one of them can be read")
-    element = elements[found[0]]
-    end = re.search(rb"end_header[^\n]*\n", data)
-    assert end is not None
-    header, body = data[: end.end()], data[end.end() :]
-    text, order = b"format ascii" in header, ">" if b"big_endian" in header else "<"
-    if element.lists != 1 or (text and element.name == "face"):
-        return data, None
-    before = elements[: found[0]]
-    if text:
-        lines = [line + b"\n" for line in body.split(b"\n") if line.strip()]
-        start = sum(part.count for part in before)
-        kept = b"".join(lines[:start])
-        lists = [np.array(line.split()[1:], np.int64) for line in lines[start : start + element.count]]
-    else:
-        start = sum(part.count * part.size for part in before)
-        kept = body[:start]
-        if element.name == "face" and _are_alike(body[start:], element, order):
-            return data, None
-        lists = list(_lists(name, body[start:], element, order))
-    faces = _unrolled(lists) if element.name == "tristrips" else _split(name, lists)
-    opening = header[: header.index(b"element " + element.name.encode())]
-    opening += b"element face %d\nproperty list uchar int vertex_indices\nend_header\n" % len(faces)
-    return opening + kept + _rows(faces, text, order), replace(element, name="face", count=len(faces))
+def note_damage(losses: Losses, found: dict[str, Rows]) -> None:
+    """Note rows that are missing or damaged."""
+    for name, rows in found.items():
+        absent = rows.element.count - rows.count
+        if absent and rows.element.properties:
+            done = "missing, as the file ends before"
+            losses.note(f"the last {plural(absent, 'row')} of {name}", done=done)
+        note_rows(losses, rows, rows.bad, "with too few or malformed words")
+        note_rows(losses, rows, rows.long, "with more words", "these are not read")
 
 
-def _rows(faces: NDArray[np.int64], text: bool, order: str) -> bytes:
-    if text:
-        return b"".join(b"3 %d %d %d\n" % tuple(face) for face in faces.tolist())
-    out = np.zeros(len(faces), [("count", "u1"), ("index", order + "i4", 3)])
-    out["count"], out["index"] = 3, faces
-    return out.tobytes()
+def note_rows(losses: Losses, rows: Rows, chosen: Bools | None, what: str, done: str = "left out") -> None:
+    """Note the chosen rows (count,), if there are any."""
+    if chosen is not None and chosen.any():
+        count = plural(int(chosen.sum()), f"row of {rows.element.name}", f"rows of {rows.element.name}")
+        losses.note(f"{count} {what}, first: {rows.place(int(chosen.argmax()))}", done=done)
 
 
-def _layout(element: Element) -> tuple[int, int, int, int]:
-    """Return the bytes of a row before its list, of the list's length, of one entry, and after the list."""
-    at = next(i for i, kinds in enumerate(element.kinds) if len(kinds) == 2)
-    length, entry = (SIZES[kind] for kind in element.kinds[at])
-    sizes = [SIZES[kinds[0]] for kinds in element.kinds]
-    return sum(sizes[:at]), length, entry, sum(sizes[at + 1 :])
+def bad_rows(rows: Rows) -> Bools:
+    """Return which rows (count,) lack something."""
+    return np.zeros(rows.count, np.bool_) if rows.bad is None else rows.bad
 
 
-def _are_alike(body: bytes, element: Element, order: str) -> bool:
-    """Return whether the lists of all rows are as long as the first one, as trimesh assumes."""
-    before, length, entry, after = _layout(element)
-    first = body[before : before + length]
-    size = before + length + int.from_bytes(first, ORDERS[order]) * entry + after
-    if size * element.count > len(body):
-        return False
-    rows = np.frombuffer(body, np.uint8, size * element.count).reshape(element.count, size)
-    return bool((rows[:, before : before + length] == np.frombuffer(first, np.uint8)).all())
+def _faces(files: SceneFiles, rows: dict[str, Rows], points: Doubles) -> Faces:
+    """Return the triangles of faces and strips."""
+    parts = []
+    for name, cut in (("face", faces_of_rows), ("tristrips", _of_strips)):
+        if name in rows and (named := _indices(rows[name])) is not None:
+            parts.append(cut(files.losses, rows[name], named, points))
+    return Faces(*map(np.concatenate, zip(NONE, *parts, strict=True)))
 
 
-def _lists(name: str, body: bytes, element: Element, order: str) -> Iterator[NDArray[np.int64]]:
-    """Read the list of every row."""
-    before, length, entry, after = _layout(element)
-    kind = order + next(TYPES[kinds[1]] for kinds in element.kinds if len(kinds) == 2)
-    at = 0
-    for row in range(element.count):
-        at += before + length
-        count = int.from_bytes(body[at - length : at], ORDERS[order])
-        if at + count * entry + after > len(body):
-            raise SceneError(f"{name}: {element.name} {row} has a list of {count}; the file ends before that")
-        yield np.frombuffer(body, kind, count, at).astype(np.int64)
-        at += count * entry + after
+def _indices(rows: Rows) -> str | None:
+    """Return the name of the list with the indices of vertices; None if there is none."""
+    usual = [name for name in ("vertex_index", "vertex_indices") if name in rows.lists]
+    return next(iter(usual or rows.lists), None)
 
 
-def _split(name: str, lists: list[NDArray[np.int64]]) -> NDArray[np.int64]:
-    """Return the triangles (m, 3) of polygons."""
-    short = next((i for i, corners in enumerate(lists) if len(corners) < 3), None)
-    if short is not None:
-        raise SceneError(
-            f"{name}: face {short} has {plural(len(lists[short]), 'corner')}; it needs at least 3"
-        )
-    return np.asarray(import_trimesh().geometry.triangulate_quads(lists), np.int64)
+def faces_of_rows(losses: Losses, rows: Rows, named: str, points: Doubles) -> Faces:
+    """Return the triangles of the faces whose vertices are in a list of rows; damaged faces are noted."""
+    counts, values = rows.lists[named]
+    with np.errstate(all="ignore"):
+        corners = values.astype(np.intp)
+    inside = (corners == values) & (corners >= 0) & (corners < len(points))
+    row = np.repeat(np.arange(rows.count), counts)
+    lost, short = np.zeros(rows.count, np.bool_), counts < 3
+    lost[row[~inside]] = True
+    note_rows(losses, rows, short & ~bad_rows(rows), "with fewer than 3 corners")
+    note_rows(losses, rows, lost, f"with a vertex beyond the {len(points)}")
+    kept = np.flatnonzero(~(lost | short | bad_rows(rows)))
+    places = np.flatnonzero(np.isin(row, kept)) if len(kept) < rows.count else np.arange(len(row))
+    corner, polygon = triangulate(points, corners[places], counts[kept], fans_by_size)
+    corner = places[corner]
+    return Faces(corners[corner], kept[polygon], corner)
 
 
-def _unrolled(strips: list[NDArray[np.int64]]) -> NDArray[np.int64]:
-    """Return the triangles (m, 3) of strips. -1 begins a new one. Degenerate ones are dropped."""
-    parts = [np.zeros((0, 3), np.int64)]
-    for strip in strips:
-        for run in np.split(strip, np.flatnonzero(strip == -1)):
-            run = run[run != -1]
+def _of_strips(losses: Losses, rows: Rows, named: str, points: Doubles) -> Faces:
+    """Return the triangles of strips. -1 begins a new one. Degenerate ones are left out."""
+    counts, values = rows.lists[named]
+    parts = [NONE]
+    for number, strip in enumerate(np.split(np.arange(len(values)), np.cumsum(counts)[:-1])):
+        for run in np.split(strip, np.flatnonzero(values[strip] == -1)):
+            run = run[values[run] != -1]
             if len(run) >= 3:
-                faces = np.stack([run[:-2], run[1:-1], run[2:]], axis=1)
-                faces[1::2] = faces[1::2, [1, 0, 2]]
-                parts.append(faces[(faces != np.roll(faces, 1, axis=1)).all(axis=1)])
-    return np.concatenate(parts)
+                corner = np.stack([run[:-2], run[1:-1], run[2:]], axis=1)
+                corner[1::2] = corner[1::2, [1, 0, 2]]
+                parts.append(Faces(values[corner].astype(np.intp), np.full(len(corner), number), corner))
+    triangles, row, corner = map(np.concatenate, zip(*parts, strict=True))
+    inside = ((triangles >= 0) & (triangles < len(points))).all(1)
+    lost = np.zeros(rows.count, np.bool_)
+    lost[row[~inside]] = True
+    note_rows(losses, rows, lost, f"with a vertex beyond the {len(points)}")
+    kept = inside & (triangles != np.roll(triangles, 1, axis=1)).all(1)
+    return Faces(triangles[kept], row[kept], corner[kept])
+
+
+def _with_uvs_of_corners(files: SceneFiles, raw: RawMesh, rows: dict[str, Rows], faces: Faces) -> RawMesh:
+    """Return a mesh with the texture coordinates that faces have for their corners, if they do."""
+    face = rows.get("face")
+    if face is None or "texcoord" not in face.lists or not len(faces.row) or "tristrips" in rows:
+        return raw
+    counts, values = face.lists["texcoord"]
+    corners, _ = face.lists[_indices(face) or ""]
+    wrong = (counts != 2 * corners) & ~bad_rows(face)
+    done = "0 in place of texture coordinates"
+    note_rows(files.losses, face, wrong, "with texture coordinates that do not fit the corners", done)
+    apart = with_corners_apart(files.name, raw)
+    begin = np.cumsum(counts) - counts, np.cumsum(corners) - corners
+    at = begin[0][faces.row][:, None] + 2 * (faces.corner - begin[1][faces.row][:, None])
+    at = np.where(wrong[faces.row][:, None], len(values), at).ravel()
+    padded = np.append(values.astype(np.float64), [0.0, 0.0])
+    apart.uvs = np.stack([padded[at], padded[at + 1]], 1)
+    return apart
+
+
+def _colors(rows: Rows | None) -> Table | None:
+    """Return linear colors (n, 4) of rows, None if they have none."""
+    found = None if rows is None else rows.units(RGB)
+    if rows is None or found is None:
+        return None
+    alpha = rows.units(["alpha"])
+    codes = np.ones((len(found), 1)) if alpha is None else np.rint(alpha * 255) / 255
+    return np.hstack([from_srgb(found), codes])
+
+
+def _codes(vertex: Rows) -> Table | None:
+    """Return the colors of points as codes (n, 3) of sRGB."""
+    found = vertex.units(RGB)
+    return None if found is None else np.rint(np.clip(np.nan_to_num(found), 0, 1) * 255).astype(np.uint8)
+
+
+def _colored(files: SceneFiles, raw: RawMesh, rows: dict[str, Rows], faces: Faces, textured: bool) -> RawMesh:
+    """Return a mesh with the colors that count: those of the vertices, unless these are white, or of faces.
+
+    White ones are defaults of some program. Beside a texture none count.
+    """
+    of_vertices, of_faces = _colors(rows["vertex"]), _colors(rows.get("face"))
+    if "tristrips" in rows:
+        of_faces = None
+    if textured:
+        for each, what in ((of_vertices, "vertex"), (of_faces, "face")):
+            if each is not None:
+                files.losses.note(f"{what} colors")
+        return raw
+    if of_faces is not None and (of_vertices is None or (of_vertices == 1).all()):
+        raw = with_corners_apart(files.name, raw)
+        raw.colors = np.repeat(of_faces[faces.row], 3, 0)
+    elif of_vertices is not None:
+        if of_faces is not None:
+            files.losses.note("face colors")
+        apart = len(raw.vertices) != len(of_vertices)
+        raw.colors = of_vertices[faces.triangles.ravel()] if apart else of_vertices
+    if is_faint(raw):  # where it has no effect
+        files.losses.note("opacity of vertex colors")
+    return raw
+
+
+def _textured(files: SceneFiles, textures: list[str]) -> MaterialSpec | None:
+    """Return the material of a texture; None if there is none."""
+    if not textures:
+        return None
+    reference = textures[-1]
+    if len(textures) > 1:
+        files.losses.note("several textures", done=f"{reference!r} is taken for all faces")
+    image = files.picture(reference, instead=GRAY)
+    if image is GRAY:  # as without a material
+        return None
+    entry = mtl.Entry(files.name, "", files=files, losses=files.losses)
+    entry.images["map_kd"] = image
+    entry.lines["map_kd"] = ("texture", 0, reference)
+    return mtl.spec(entry)

@@ -10,13 +10,12 @@ from typing import Any, TypeAlias
 
 from ..core.errors import SceneError, passed_limit
 from ..core.files import decode_text, extension_of
-from ..core.plural import plural
 from ..core.registry import Registry
 from ..scene import Scene
 from ..shapes.smoothing import AUTO
 from . import dae, gltf, mtl, obj, off, ply, stl, threemf, trimesh_objects
 from .appearance import MaterialSpec, assign_material, from_srgb
-from .clouds import cloud, cloud_of_trimesh
+from .clouds import cloud
 from .contents import Contents
 from .gltf_materials import GltfMaterials
 from .losses import Losses
@@ -126,14 +125,7 @@ def _libraries(files: SceneFiles, libraries: list[str]) -> dict[str, MaterialSpe
 
 
 def _read_ply(files: SceneFiles, data: bytes, options: LoadOptions) -> Contents:
-    name = files.name
-    found, claimed = ply.parse(files, data, options.materials)
-    contents = trimesh_objects.read(found, name, files.losses)
-    faces = sum(len(raw.faces) for raw in contents.raws)
-    if faces < claimed:
-        raise SceneError(f"{name}: claims {plural(claimed, 'row')} of face; {faces} can be read")
-    points = cloud_of_trimesh(files.losses, found) if not faces else None
-    return contents if points is None else replace(contents, shapes=[points])
+    return ply.parse(files, data, options.materials).contents
 
 
 def _read_stl(files: SceneFiles, data: bytes, options: LoadOptions) -> Contents:
@@ -143,8 +135,8 @@ def _read_stl(files: SceneFiles, data: bytes, options: LoadOptions) -> Contents:
 
 
 def _read_off(files: SceneFiles, data: bytes, options: LoadOptions) -> Contents:
-    found = off.parse(files.losses, data, options.materials)
-    return trimesh_objects.read(found, files.name, files.losses)
+    raws = off.parse(files.losses, data, options.materials)
+    return Contents.once([raw for raw in raws if len(raw.faces)])
 
 
 def _read_dae(files: SceneFiles, data: bytes, options: LoadOptions) -> Contents:
@@ -201,10 +193,10 @@ def mesh_reader(files: SceneFiles) -> Callable[[Path], list[RawMesh]]:
         _refuse(name, data)
         if kind == ".obj":
             return _read_obj(own, data, LoadOptions(files.losses, materials=False, limits=files.limits)).raws
-        found, _ = ply.parse(own, data, materials=False)
-        raws = trimesh_objects.read(found, name, files.losses).raws
-        for raw, mesh in zip(raws, found.geometry.values(), strict=False):
-            raw.attributes = ply_attributes(mesh.metadata.get("_ply_raw", {}))
+        parsed = ply.parse(own, data, materials=False)
+        raws = parsed.contents.raws
+        for raw in raws:
+            raw.attributes = ply_attributes(parsed.rows, parsed.row)
         return raws
 
     from .mitsuba.attributes import ply_attributes

@@ -58,15 +58,26 @@ def with_face_colors(source: str, raw: RawMesh, colors: Table) -> RawMesh:
     SceneError
         If an index is out of range; `source` is for messages, as for `build`.
     """
+    apart = with_corners_apart(source, raw)
+    apart.colors = np.repeat(colors, 3, 0)
+    return apart
+
+
+def with_corners_apart(source: str, raw: RawMesh) -> RawMesh:
+    """Return the same mesh with a separate vertex for every corner; arguments and errors as before."""
     _check_indices(_label(source, raw), raw.faces, len(raw.vertices))
     corners = raw.faces.ravel()
+
+    def of_corners(values: Table | None) -> Table | None:
+        return None if values is None else values[corners]
+
     return replace(
         raw,
         vertices=raw.vertices[corners],
         faces=np.arange(corners.size).reshape(-1, 3),
-        normals=None if raw.normals is None else raw.normals[corners],
-        uvs=None if raw.uvs is None else raw.uvs[corners],
-        colors=np.repeat(colors, 3, 0),
+        normals=of_corners(raw.normals),
+        uvs=of_corners(raw.uvs),
+        colors=of_corners(raw.colors),
     )
 
 

@@ -6,11 +6,13 @@ Source: the documentation of Mitsuba 3, plugin "ply".
 from __future__ import annotations
 
 import re
-from typing import Any
+from collections.abc import Sequence
 
 import numpy as np
 
+from ...arrays.vec import Ints
 from ...core.errors import SceneError
+from ..ply_rows import Rows
 from ..repair import RawMesh, Table, with_face_colors
 from .nodes import Node
 
@@ -18,22 +20,27 @@ SERIES = (("r", "g", "b"), ("red", "green", "blue"), ("x", "y", "z"), ("0", "1",
 OWN = re.compile(r"n?[xyz]|[uvst]|texture_[uv]|vertex_ind\w+")  # properties that are no attributes
 
 
-def ply_attributes(elements: dict[str, Any]) -> dict[str, Table]:
-    """Return the attributes of the elements of a file, as trimesh keeps them: (n, 1 or 3) for each name."""
+def ply_attributes(rows: dict[str, Rows], face: Ints) -> dict[str, Table]:
+    """Return the attributes of a file, (n, 1 or 3) for each name, given the face (m,) of each triangle."""
     found: dict[str, Table] = {}
     for kind in ("vertex", "face"):
-        element = elements.get(kind, {})
-        names = [name for name in element.get("properties", {}) if not OWN.fullmatch(name)]
+        columns = rows[kind].columns if kind in rows else {}
+        names = [name for name in columns if not OWN.fullmatch(name)]
+
+        def add(name: str, parts: Sequence[str], kind: str = kind) -> None:
+            values = rows[kind].units(parts)
+            if values is not None:
+                found.setdefault(f"{kind}_{name}", values if kind == "vertex" else values[face])
+
         for colors in (("r", "g", "b"), ("red", "green", "blue")):
             if set(colors) <= set(names):
-                found[f"{kind}_color"] = _columns(element, colors)
+                add("color", colors)
         for name in names:
             prefix, separator, last = name.rpartition("_")
             series = next((each for each in SERIES if last == each[0]), None)
             if separator and series is not None:
                 parts = [f"{prefix}_{each}" for each in series]
-                columns = parts if set(parts) <= set(names) else [name]
-                found.setdefault(f"{kind}_{prefix}", _columns(element, columns))
+                add(prefix, parts if set(parts) <= set(names) else [name])
     return found
 
 
@@ -61,9 +68,3 @@ def _shown(node: Node) -> set[str]:
     if node.plugin == "mesh_attribute":
         return {node.text("name")}
     return {name for value in node.values.values() if isinstance(value, Node) for name in _shown(value)}
-
-
-def _columns(element: dict[str, Any], names: Any) -> Table:
-    columns = [np.asarray(element["data"][name]).reshape(-1) for name in names]
-    scale = [np.iinfo(each.dtype).max if each.dtype.kind in "ui" else 1 for each in columns]
-    return np.stack([each.astype(np.float64) / most for each, most in zip(columns, scale, strict=True)], 1)

@@ -9,6 +9,7 @@ import numpy as np
 
 from ...core.errors import SceneError
 from ...core.plural import plural
+from ..polygons import triangulate
 from ..repair import RawMesh
 from .gprims import gprim
 from .materials import COORDINATES, Look, Materials
@@ -129,12 +130,10 @@ class Meshes:
             and prim.GetAttribute("subdivisionScheme").IsAuthored()
         ):
             self.lose(prim, "subdivisionScheme; the mesh of its control points in its place")
-        triangles = counts - 2
-        face = np.repeat(np.arange(len(counts)), triangles)
-        step = np.arange(len(face)) - np.repeat(np.cumsum(triangles) - triangles, triangles)
-        start = np.repeat(np.cumsum(counts) - counts, triangles)
-        order = (0, 2, 1) if value_of(prim, self.time, "orientation") == "leftHanded" else (0, 1, 2)
-        corner = np.stack([start, start + step + 1, start + step + 2], 1)[:, order]
+        holes = np.asarray(value_of(prim, self.time, "holeIndices", []), np.intp)
+        corner, face = triangulate(points, corners, counts, holes=holes)
+        if value_of(prim, self.time, "orientation") == "leftHanded":
+            corner = corner[:, [0, 2, 1]]
         return _Triangles(prim, points, face, corner, corners[corner])
 
     def _first_coordinates(self, prim: Any) -> str:

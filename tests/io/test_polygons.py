@@ -1,0 +1,249 @@
+"""Polygons of files as triangles: concave ones, with holes, bent, degenerate, in every format."""
+
+import struct
+import warnings
+
+import numpy as np
+import pytest
+
+from wavefront.io.load import load, load_mesh
+from wavefront.io.polygons import fans, fans_by_size, triangulate, turned_fans
+
+L = [(-1, -1), (1, -1), (1, 0), (0, 0), (0, 1), (-1, 1)]
+DART = [(-1, -1), (0, -0.5), (1, -1), (0, 1)]
+RING = [(-0.5, -0.5), (-0.5, 0.5), (0.5, 0.5), (0.5, -0.5)]
+SQUARE = [(-1, -1), (1, -1), (1, 1), (-1, 1)]
+WALL = [*SQUARE, SQUARE[0], *RING, RING[0]]  # a window, joined to the wall by a seam
+COMB = [(0, 0), (7, 0), *((x, y) for x in range(7, 0, -1) for y in ((1, 3) if x % 2 else (3, 1))), (0, 1)]
+SPIRAL = [(0, 0), (5, 0), (5, 5), (1, 5), (1, 2), (3, 2), (3, 3), (2, 3), (2, 4), (4, 4), (4, 1), (0, 1)]
+POLYGONS = {"L": L, "dart": DART, "wall": WALL, "comb": COMB, "spiral": SPIRAL}
+
+
+def area(polygon):
+    """The signed area of a plane polygon."""
+    x, y = np.array(polygon, float).T
+    return float((x * np.roll(y, -1) - y * np.roll(x, -1)).sum() / 2)
+
+
+def areas(points, triangles):
+    """Twice their area as vectors (m, 3)."""
+    a, b, c = (np.asarray(points)[triangles[:, i]] for i in range(3))
+    return np.cross(b - a, c - a)
+
+
+def covered(points, triangles, at):
+    """How many triangles lie over points (n, 2) of the plane."""
+    a, b, c = (np.asarray(points)[triangles[:, i]][:, None, :2] for i in range(3))
+    sides = [
+        (q - p)[..., 0] * (at - p)[..., 1] - (q - p)[..., 1] * (at - p)[..., 0]
+        for p, q in ((a, b), (b, c), (c, a))
+    ]
+    return (np.sign(sides[0]) == np.sign(sides[1])) & (np.sign(sides[1]) == np.sign(sides[2]))
+
+
+def cut(points, order=fans):
+    """Triangulate one polygon."""
+    points = np.array([(*point, 0)[:3] for point in points], float)
+    return points, triangulate(points, np.arange(len(points)), np.array([len(points)]), order).corner
+
+
+@pytest.mark.parametrize("name", POLYGONS)
+@pytest.mark.parametrize("begin", [0, 1, 3])
+@pytest.mark.parametrize("backwards", [False, True])
+def test_concave_polygons_are_covered_once(name, begin, backwards):
+    """From every first corner, with the winding of the polygon."""
+    polygon = POLYGONS[name][begin:] + POLYGONS[name][:begin]
+    points, triangles = cut(polygon[::-1] if backwards else polygon)
+    found = areas(points, triangles)[:, 2] / 2 * (-1 if backwards else 1)
+    assert (found > 0).all()
+    assert found.sum() == pytest.approx(area(polygon))
+    at = np.random.default_rng(0).uniform(-1, 7, (2000, 2))
+    assert covered(points, triangles, at).sum(0).max() == 1
+
+
+@pytest.mark.parametrize("name", POLYGONS)
+def test_polygons_in_any_plane_far_from_the_origin(name):
+    rng = np.random.default_rng(1)
+    for _ in range(5):
+        turn, _ = np.linalg.qr(rng.normal(size=(3, 3)))
+        flat, _ = cut(POLYGONS[name])
+        points = flat @ turn.T * 0.1 + rng.normal(size=3) * 1e5
+        triangles = cut(points)[1]
+        found = areas(points, triangles) @ turn[:, 2] * np.linalg.det(turn) / 0.02 * np.linalg.det(turn)
+        assert (found > -1e-8).all()  # positions are rounded to 1e-10 of the polygon
+        assert found.sum() == pytest.approx(area(POLYGONS[name]), rel=1e-6)
+
+
+def test_polygons_that_are_bent():
+    """They are seen along their mean normal."""
+    height = np.random.default_rng(2).uniform(-0.2, 0.2, len(SPIRAL))
+    points, triangles = cut([(x, y, z) for (x, y), z in zip(SPIRAL, height, strict=True)])
+    found = areas(points, triangles)[:, 2] / 2
+    assert (found > 0).all()
+    assert found.sum() == pytest.approx(area(SPIRAL))
+
+
+@pytest.mark.parametrize("counts", [[3, 3], [4, 4], [5], [3, 4, 5, 4, 3, 7], []])
+def test_convex_polygons_are_fans(counts):
+    """In the order of each reader, also with corners that are on a line but for rounding."""
+    corner = [(np.cos(t), np.sin(t), 0) for n in counts for t in np.arange(n) * 2 * np.pi / n]
+    points = np.array(corner, np.float32).reshape(-1, 3).astype(float)
+    for order in (fans, turned_fans, fans_by_size):
+        found = triangulate(points, np.arange(len(points)), np.array(counts, int), order)
+        assert np.array_equal(found.corner, order(np.array(counts, int)).corner)
+    assert [tuple(row) for row in fans(np.array([4])).corner] == [(0, 1, 2), (0, 2, 3)]
+    assert [tuple(row) for row in turned_fans(np.array([4])).corner] == [(0, 1, 2), (2, 3, 0)]
+    assert fans_by_size(np.array([5, 4, 3, 4])).polygon.tolist() == [2, 1, 3, 1, 3, 0, 0, 0]
+
+
+def test_a_circle_of_float32_stays_a_fan():
+    angles = np.arange(2048) * 2 * np.pi / 2048
+    points = (np.stack([np.cos(angles), np.sin(angles), 0 * angles], 1) + 3).astype(np.float32).astype(float)
+    found = triangulate(points, np.arange(2048), np.array([2048]))
+    assert np.array_equal(found.corner, fans(np.array([2048])).corner)
+
+
+@pytest.mark.parametrize(
+    ("polygon", "expected"),
+    [
+        ([(0, 0), (1, 0), (2, 0), (2, 2)], [[0, 2, 3]]),  # corners on a line
+        ([(0, 0), (1, 0), (1, 1), (1, 1), (0, 1)], [[0, 1, 2], [0, 3, 4]]),  # one corner twice
+        ([(0, 0), (1, 0), (1, 0), (0, 1)], [[0, 2, 3]]),
+        (
+            [(0, 0), (1, 0), (2, 0), (3, 0)],
+            [[0, 1, 2], [0, 2, 3]],
+        ),  # without an area; dropped where meshes are built
+        ([(0, 0), (1, 0), (0, 1), (1, 1)], [[0, 1, 2], [0, 2, 3]]),  # crosses itself
+        ([(0, 0), (np.nan, 0), (1, 1), (0.2, 0.1), (0, 1)], [[1, 1, 1]]),  # left out as a whole
+        ([(0, 0), (0, np.inf), (1, 1e39), (1, 1)], [[1, 1, 1]]),
+    ],
+)
+def test_degenerate_polygons(polygon, expected):
+    assert cut(polygon)[1].tolist() == expected
+
+
+def test_a_star_that_crosses_itself_has_no_error():
+    star = [(np.cos(t), np.sin(t)) for t in np.arange(5) * 4 * np.pi / 5]
+    points, triangles = cut(star)
+    assert (areas(points, triangles)[:, 2] > 0).all()
+
+
+def test_holes_are_left_out():
+    points = np.array([(x, y, 0) for x, y in SQUARE * 3], float)
+    found = triangulate(points, np.arange(12), np.array([4, 4, 4]), holes=np.array([1, 7]))
+    assert found.polygon.tolist() == [0, 0, 2, 2]
+
+
+# ---- in files ---------------------------------------------------------------------------------
+
+
+def obj(polygons):
+    corners = [corner for polygon in polygons for corner in polygon]
+    numbers = iter(range(1, len(corners) + 1))
+    faces = [" ".join(f"{i}/{i}/1" for _, i in zip(polygon, numbers, strict=False)) for polygon in polygons]
+    rows = [f"v {x} {y} 0\nvt {x} {y}" for x, y in corners]
+    return "\n".join([*rows, "vn 0 0 1", *(f"f {face}" for face in faces), ""])
+
+
+def numbered(polygons):
+    """Corners of polygons, and their numbers."""
+    ends = np.cumsum([len(polygon) for polygon in polygons])
+    corners = [corner for polygon in polygons for corner in polygon]
+    return corners, [range(end - len(polygon), end) for end, polygon in zip(ends, polygons, strict=True)]
+
+
+def ply(polygons, kind="ascii"):
+    corners, faces = numbered(polygons)
+    lines = ["ply", f"format {kind} 1.0", f"element vertex {len(corners)}"]
+    lines += [f"property float {x}" for x in ("x", "y", "z", "s", "t")]
+    lines += [f"element face {len(faces)}", "property list uchar int vertex_indices", "end_header", ""]
+    header = "\n".join(lines)
+    if kind == "ascii":
+        rows = [f"{x} {y} 0 {x} {y}" for x, y in corners]
+        return header + "\n".join([*rows, *(f"{len(f)} {' '.join(map(str, f))}" for f in faces), ""])
+    order = "<" if "little" in kind else ">"
+    rows = b"".join(struct.pack(f"{order}5f", x, y, 0, x, y) for x, y in corners)
+    return header.encode() + rows + b"".join(struct.pack(f"{order}B{len(f)}i", len(f), *f) for f in faces)
+
+
+def off(polygons):
+    corners, faces = numbered(polygons)
+    rows = [f"{x} {y} 0" for x, y in corners] + [f"{len(f)} {' '.join(map(str, f))}" for f in faces]
+    return "\n".join([f"OFF {len(corners)} {len(faces)} 0", *rows, ""])
+
+
+def usda(polygons, more=""):
+    corners, faces = numbered(polygons)
+    points = [(float(x), float(y), 0.0) for x, y in corners]
+    return f"""#usda 1.0
+(
+    metersPerUnit = 1
+    upAxis = "Y"
+)
+def Mesh "m" {{
+    int[] faceVertexCounts = {[len(face) for face in faces]}
+    int[] faceVertexIndices = {[i for face in faces for i in face]}
+    point3f[] points = {points}
+    normal3f[] normals = {[(0, 0, 1)] * len(corners)} (interpolation = "faceVarying")
+    texCoord2f[] primvars:st = {[(x, y) for x, y, _ in points]} (interpolation = "faceVarying")
+    uniform token subdivisionScheme = "none"
+    {more}
+}}
+"""
+
+
+WRITERS = {
+    "obj": obj,
+    "ply": ply,
+    "little.ply": lambda polygons: ply(polygons, "binary_little_endian"),
+    "big.ply": lambda polygons: ply(polygons, "binary_big_endian"),
+    "off": off,
+    "usda": usda,
+}
+GROUPS = {
+    "one": [L],
+    "mixed": [L, SQUARE, DART, [(0, 0), (1, 0), (0, 1)], WALL],
+    "darts": [DART, SQUARE, DART],
+    "walls": [WALL, WALL],
+}
+
+
+@pytest.mark.parametrize("group", GROUPS)
+@pytest.mark.parametrize("name", WRITERS)
+def test_polygons_of_files(tmp_path, name, group):
+    """Positions, normals and texture coordinates follow the same triangles, without a warning."""
+    if name == "usda":
+        pytest.importorskip("pxr")
+    data = WRITERS[name](GROUPS[group])
+    path = tmp_path / f"a.{name}"
+    path.write_bytes(data if isinstance(data, bytes) else data.encode())
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        mesh = load_mesh(path, strict=True)
+    found = areas(mesh.vertices, mesh.faces)[:, 2] / 2
+    assert (found > 0).all()
+    assert found.sum() == pytest.approx(sum(map(area, GROUPS[group])))
+    if mesh.uvs is not None:
+        assert np.array_equal(mesh.uvs, mesh.vertices[:, :2])
+    assert (mesh.uvs is None) == (name == "off")
+
+
+def test_polygons_with_a_bad_vertex_are_left_out_as_a_whole(tmp_path):
+    """Their line is that of the face, however many triangles those before have."""
+    text = "v 0 0 0\nv 2 0 0\nv 2 2 0\nv 1 .5 0\nv nan 0 0\nf 1 2 3 4\nf 1 2 3\nf 1 2 3 5\n"
+    (tmp_path / "a.obj").write_text(text)
+    message = "1 face with a vertex that is not finite or beyond float32, first: line 8"
+    with pytest.warns(UserWarning, match=message):
+        mesh = load_mesh(tmp_path / "a.obj")
+    assert len(mesh.faces) == 3
+
+
+@pytest.mark.parametrize("handed", ["rightHanded", "leftHanded"])
+def test_hole_indices_and_orientation_of_usd(tmp_path, handed):
+    pytest.importorskip("pxr")
+    more = f'int[] holeIndices = [1]\n    uniform token orientation = "{handed}"'
+    (tmp_path / "a.usda").write_text(usda([L, SQUARE, DART], more))
+    (mesh,) = load(tmp_path / "a.usda", strict=True).shapes
+    found = areas(mesh.vertices, mesh.faces)[:, 2] / 2 * (1 if handed == "rightHanded" else -1)
+    assert (found > 0).all()
+    assert found.sum() == pytest.approx(area(L) + area(DART))

@@ -1,0 +1,221 @@
+"""The rows of a PLY file as whole columns, from text or bytes.
+
+Rows of a text that are damaged are marked. A binary file that ends early, or has an impossible length of a
+list, ends before that row.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..arrays.vec import Bools, Doubles, Ints
+from .ply_header import Element, Header, Property
+from .text_lines import NUMBER
+
+
+@dataclass
+class Rows:
+    """The rows of an element that are there."""
+
+    element: Element
+    count: int
+    columns: dict[str, NDArray[Any]] = field(default_factory=dict)  # (count,), by the name of the property
+    lists: dict[str, tuple[Ints, NDArray[Any]]] = field(default_factory=dict)  # lengths (count,), all values
+    bad: Bools | None = None  # (count,) where a row lacks something
+    long: Bools | None = None  # (count,) where words follow that are not read
+    lines: Ints | None = None  # (count,) of a text
+
+    def place(self, row: Any) -> str:
+        """Return where a row is, for messages."""
+        return f"{self.element.name} {row}" if self.lines is None else f"line {self.lines[row]}"
+
+    def table(self, names: Iterable[str]) -> Doubles | None:
+        """Return columns (count, k), None if one is missing."""
+        found = [self.columns.get(name) for name in names]
+        there = [_as(column, "f8") for column in found if column is not None]
+        return np.stack(there, 1) if len(there) == len(found) else None
+
+    def units(self, names: Iterable[str]) -> Doubles | None:
+        """Return the same, where the largest whole number of a type stands for 1.
+
+        Larger types than two bytes often have bytes in them.
+        """
+        kinds = {each.name: each.kind for each in self.element.properties}
+        found = self.table(names := tuple(names))
+        if found is None:
+            return None
+        for i, name in enumerate(names):
+            if kinds[name][0] != "f":
+                byte = kinds[name] not in ("u1", "u2") and found[:, i].max(initial=0) <= 255
+                found[:, i] /= 255 if byte else np.iinfo(kinds[name]).max
+        return found
+
+
+def read_rows(header: Header, data: bytes) -> dict[str, Rows]:
+    """Return the rows of each element, by its name."""
+    found = (_binary if header.order else _text)(header, data)
+    return {rows.element.name: rows for rows in found}
+
+
+def _text(header: Header, data: bytes) -> list[Rows]:
+    lines = data[header.end :].decode("latin-1").rstrip("\x1a\0").split("\n")
+    used = np.array([number for number, line in enumerate(lines) if line and not line.isspace()], np.intp)
+    out, at = [], 0
+    for element in header.elements:
+        own = used[at : at + element.count]
+        at += len(own)
+        rows = rows_of_lines(element, [lines[number].split() for number in own.tolist()])
+        rows.lines = own + header.lines + 1
+        out.append(rows)
+    return out
+
+
+def rows_of_lines(element: Element, lines: list[list[str]]) -> Rows:
+    """Return the rows of an element, each from the words of a line."""
+    widths = np.array([len(words) for words in lines], np.intp)
+    values = _numbers([word for words in lines for word in words])
+    end = np.cumsum(widths)
+    at, bad = end - widths, np.zeros(len(lines), np.bool_)
+    rows = Rows(element, len(lines), bad=bad)
+    padded = np.append(values, np.nan)
+    for each in element.properties:
+        found = np.where(at < end, padded[np.minimum(at, len(values))], np.nan)
+        bad |= at >= end
+        at = at + 1
+        if each.length:
+            whole = (found >= 0) & (found <= end - at) & (found == np.rint(found))
+            counts = np.where(whole, found, 0).astype(np.intp)
+            bad |= ~whole
+            rows.lists[each.name] = counts, values[_ranges(at, counts)]
+            at = at + counts
+        else:
+            rows.columns[each.name] = _as(found, "f4") if each.kind == "f4" else found
+    rows.long = (at < end) & ~bad
+    return rows
+
+
+def _as(values: NDArray[Any], kind: str) -> NDArray[Any]:
+    """Return values as numbers of a type; a signaling NaN is any NaN, and what is too large infinite."""
+    with np.errstate(all="ignore"):
+        return values.astype(kind)
+
+
+def _numbers(words: list[str]) -> Doubles:
+    """Return the numbers of words, NaN for those that are none."""
+    try:
+        if "_" not in "".join(words):
+            return np.fromiter(map(float, words), np.float64, len(words))
+    except ValueError:
+        pass
+    numbers = (float(word) if NUMBER.fullmatch(word) else np.nan for word in words)
+    return np.fromiter(numbers, np.float64, len(words))
+
+
+def _ranges(starts: Ints, counts: Ints) -> Ints:
+    """Return the numbers from each start on, as many as its count, one range after the other."""
+    return np.repeat(starts - np.cumsum(counts) + counts, counts) + np.arange(counts.sum())
+
+
+def _binary(header: Header, data: bytes) -> list[Rows]:
+    out, at = [], header.end
+    for element in header.elements:
+        rows, at = _alike(element, data, at, header.order) or _unlike(element, data, at, header.order)
+        out.append(rows)
+    return out
+
+
+def _alike(element: Element, data: bytes, at: int, order: str) -> tuple[Rows, int] | None:
+    """Return rows whose lists are as long as those of the first, and where they end; None if not all are."""
+    kinds: list[Any] = []
+    size = 0
+    for number, each in enumerate(element.properties):
+        count = 1
+        if each.length:
+            place = slice(at + size, at + size + int(each.length[1]))
+            count = _length(data[place], each, order)
+            if not 0 <= count * each.size <= len(data):
+                return None
+            kinds.append((f"length {number}", order + each.length))
+        kinds.append((str(number), order + each.kind, (count,)))
+        size = np.dtype(kinds).itemsize
+    count = min(element.count, (len(data) - at) // size) if size else 0
+    table = np.frombuffer(data, np.dtype(kinds), count, at)
+    rows = Rows(element, count)
+    for number, each in enumerate(element.properties):
+        values = table[str(number)]
+        if each.length:
+            lengths = table[f"length {number}"]
+            if count < element.count or (lengths != lengths[:1]).any():
+                return None
+            rows.lists[each.name] = lengths.astype(np.intp), values.ravel()
+        else:
+            rows.columns[each.name] = values[:, 0]
+    return rows, at + count * size
+
+
+def _length(field: bytes, each: Property, order: str) -> int:
+    """Return the length of a list from its bytes."""
+    return int.from_bytes(field, "big" if order == ">" else "little", signed=each.length[0] == "i")
+
+
+def _unlike(element: Element, data: bytes, at: int, order: str) -> tuple[Rows, int]:
+    """Return rows with lists of any lengths, and where they end."""
+    lists = [each for each in element.properties if each.length]
+    widths = [int(each.length[1]) for each in lists]
+    gaps = _gaps(element.properties)
+    found: list[list[int]] = [[] for _ in lists]  # where the values of each list begin
+    starts: list[int] = []
+    while len(starts) < element.count:
+        begins, place = [], at
+        for each, gap, width in zip(lists, gaps, widths, strict=False):
+            place += gap + width
+            begins.append(place)
+            length = _length(data[place - width : place], each, order)
+            place = place + length * each.size if length >= 0 else len(data) + 1
+        place += gaps[-1]
+        if place > len(data):
+            break
+        starts.append(at)
+        for each_found, begin in zip(found, begins, strict=True):
+            each_found.append(begin)
+        at = place
+    return _gathered(
+        element, data, order, np.array(starts, np.intp), [np.array(b, np.intp) for b in found]
+    ), at
+
+
+def _gaps(properties: list[Property]) -> list[int]:
+    """Return the bytes of the numbers before each list, and of those after the last."""
+    gaps = [0]
+    for each in properties:
+        if each.length:
+            gaps.append(0)
+        else:
+            gaps[-1] += each.size
+    return gaps
+
+
+def _gathered(element: Element, data: bytes, order: str, at: Ints, lists: list[Ints]) -> Rows:
+    """Return rows that begin at bytes `at`, whose lists have their values from bytes `lists` on."""
+    rows, octets, left = Rows(element, len(at)), np.frombuffer(data, np.uint8), iter(lists)
+
+    def values(begin: Ints, kind: str) -> NDArray[Any]:
+        parts = octets[begin[:, None] + np.arange(int(kind[1]))]
+        return parts.view(order + kind).ravel()
+
+    for each in element.properties:
+        if each.length:
+            begin = next(left)
+            counts = values(begin - int(each.length[1]), each.length).astype(np.intp)
+            at = begin + counts * each.size
+            places = np.repeat(begin, counts) + each.size * _ranges(np.zeros_like(counts), counts)
+            rows.lists[each.name] = counts, values(places, each.kind)
+        else:
+            rows.columns[each.name] = values(at, each.kind)
+            at = at + each.size
+    return rows
