@@ -110,7 +110,7 @@ def test_materials_are_shaded_by_bsdf() -> None:
     assert scene.materials.normal_map_of.tolist() == [-1, 0, 0, -1]
     assert scene.materials.normal_maps == (bumps,)
     assert scene.media is not None
-    assert scene.absorption.tolist() == [[0, 0, 2, 0]] * 3
+    assert scene.media.entry_of.tolist() == [0, 0, 1, 0]
     assert scene.opacities is not None
     assert scene.opacities.constant.tolist() == [0.5, 1, 1, 1]
 
