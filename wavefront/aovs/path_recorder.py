@@ -65,4 +65,4 @@ class PathRecorder:
         """Record light `arriving` (3, k) that has been added to slots (k,) of the `picture` (3, n)."""
 
     def record_background(self, slot: Ints, color: Floats) -> None:
-        """Record a background (3, 1) that has been added to slots (k,)."""
+        """Record what has arrived of a background, (3, k), and has been added to slots (k,)."""

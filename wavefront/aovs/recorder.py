@@ -62,7 +62,6 @@ class SampleRecorder(PathRecorder):
     ) -> None:
         self._wanted, self._scene = tuple(wanted), scene
         self._values = {name: np.zeros((AOVS[name].channels, n), f4) for name in BOUNDED if name in wanted}
-        self._covered = np.zeros(n, np.bool_) if "alpha" in wanted else None
         self._coverage = Coverage(scene, n) if "coverage" in wanted else None
         self._light: dict[str, Floats] = {}
         if "direct" in wanted or "indirect" in wanted:
@@ -118,8 +117,8 @@ class SampleRecorder(PathRecorder):
         """Record what paths meet next; see `PathRecorder`."""
         self._shade_awaited()
         (paths, hits), first, self._begun = (met.paths, met.hits), not self._begun, True
-        if first and self._covered is not None:
-            self._covered[paths.slot] = hits.prim != -1
+        if first and "alpha" in self._values:
+            self._values["alpha"][:, paths.slot] = _opacity(paths, hits)
         if first and self._coverage is not None:
             self._coverage.record(scene, paths, hits)
         if not self._needs_surfaces(paths, first):
@@ -224,7 +223,7 @@ class SampleRecorder(PathRecorder):
             each.record(paths, contribution, slot, arriving)
 
     def record_background(self, slot: Ints, color: Floats) -> None:
-        """Record a background (3, 1) that has been added to slots (k,)."""
+        """Record what has arrived of a background, (3, k), and has been added to slots (k,)."""
         if "direct" in self._light:
             self._light["direct"][:, slot] += color
 
@@ -275,10 +274,7 @@ class SampleRecorder(PathRecorder):
         light = {name: values.reshape(3, samples, -1) for name, values in self._light.items()}
         for values in self._light.values():
             values[:, dropped] = 0
-        counts = {}
-        if self._covered is not None:
-            self._covered[dropped] = False
-            counts["alpha"] = self._covered.reshape(samples, -1).sum(0, dtype=np.int32)
+        counts: dict[str, Ints] = {}
         if self._coverage is not None:
             counts.update(self._coverage.counts(samples, dropped))
         return AovSamples(counts, self._bounded(samples, dropped), light)
@@ -393,6 +389,17 @@ def recorded_aovs(wanted: Sequence[str], scene: CompiledScene) -> tuple[str, ...
         keys = scene.light_groups.names if name == "light_groups" else dict.fromkeys(scene.shape_names)
         names += [f"{name}.{key}" for key in keys] if name in KEYED_AOVS else [name]
     return tuple(names)
+
+
+def _opacity(paths: Paths, hits: Hits) -> Floats:
+    """Return how much of the background camera paths (n,) hide: all where they meet anything, else by media.
+
+    Media leave the part by which the throughput of its channels weighs a gray background. That is never above
+    2, as what paths are weighted with where media scatter has a mean of 1 over the channels.
+    """
+    red, green, blue = paths.throughput
+    left = np.minimum((red + green + blue) / f4(3), f4(2))
+    return np.where(hits.prim == -1, f4(1) - left, f4(1))
 
 
 def _is_direct(depth: Bytes, contribution: Contribution) -> Bools:

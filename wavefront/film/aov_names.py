@@ -42,7 +42,7 @@ AOVS: dict[str, Aov] = {
     "shape_id": _geometric(1, "number of the shape in the scene, int32"),
     "instance_id": _geometric(1, "number of the instance in the scene, int32"),
     "material_id": _geometric(1, "number of the material in the scene, int32"),
-    "alpha": _sampled(1, "part of the pixel that surfaces cover"),
+    "alpha": _sampled(1, "part of the pixel that surfaces cover, and that media take of the background"),
     "albedo": _sampled(3, "reflectance of the surfaces that the camera sees"),
     "direct": _sampled(3, "radiance that the integrator direct_mis estimates, emission included"),
     "indirect": _sampled(3, "the rest of the radiance"),

@@ -15,8 +15,8 @@ from ..arrays.vec import Floats, Ints, f4
 FRACTION_BITS = 24  # of fixed-point numbers
 ONE = f4(2**FRACTION_BITS)
 NARROW_TERMS = 127  # so many fixed-point numbers from -1 to 1 can be summed as int32
-COUNTED = ("alpha", "coverage")  # layers whose samples are 0 or 1
-BOUNDED = ("albedo", "denoising_albedo", "denoising_normal")  # layers whose samples are in [-1, 1]
+COUNTED = ("coverage",)  # layers whose samples are 0 or 1
+BOUNDED = ("alpha", "albedo", "denoising_albedo", "denoising_normal")  # layers whose samples are in [-1, 1]
 
 FixedPoint = NDArray[np.int32] | NDArray[np.int64]
 
@@ -33,7 +33,7 @@ class FixedPointSamples:
 class AovSamples:
     """The sampled AOVs of a wave: samples of k pixels."""
 
-    counts: dict[str, Ints]  # (k,) how many samples of each pixel are 1: "alpha", and "coverage.NAME"
+    counts: dict[str, Ints]  # (k,) how many samples of each pixel are 1: "coverage.NAME"
     bounded: dict[str, FixedPointSamples]
     radiance: dict[str, Floats]  # (3, samples, k): "direct", and "light_groups.NAME"
 

@@ -17,16 +17,17 @@ def show_background(
 ) -> Contribution:
     """Add the background to L in place of the environment, and return the other light that camera rays meet.
 
-    The background is no light: it belongs to no group of lights, and no other path meets it. The backdrop of
-    an environment is light in place of the environment's.
+    The background is no light: it belongs to no group of lights, and no other path meets it. Of it arrives
+    what media on the way have left. The backdrop of an environment is light in place of the environment's.
     """
     if scene.background is None:
         return emission if scene.backdrop is None else _before(scene.backdrop, paths, hits, emission)
     missed = np.flatnonzero(hits.prim == -1)
     slot = take(paths.slot, missed)
-    L[:, slot] += scene.background
+    arriving = take(paths.throughput, missed) * scene.background
+    L[:, slot] += arriving
     if paths.recorder is not None:
-        paths.recorder.record_background(slot, scene.background)
+        paths.recorder.record_background(slot, arriving)
     on_surfaces = np.flatnonzero(take(hits.prim, emission.lanes) >= 0)
     return emission.take(on_surfaces)
 
