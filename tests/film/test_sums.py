@@ -80,11 +80,11 @@ def test_sums_are_restored_from_their_arrays() -> None:
     [
         ((), False, 0),
         ((), True, 192),
-        (("alpha",), False, 4),
+        (("alpha",), False, 2 * 4),
         (("albedo",), False, 3 * 8),
         (("direct", "indirect"), False, 60 + 12),
         (("indirect",), False, 60 + 12),  # its sums are those of the picture without "direct"
-        (("alpha", "light_groups.sun"), True, 4 + 60 + 192),
+        (("alpha", "light_groups.sun"), True, 2 * 4 + 60 + 192),
     ],
 )
 def test_the_memory_of_a_pixel_is_that_of_the_arrays(

@@ -62,7 +62,7 @@ LUX = "lux"
 MEASURED_AOVS: dict[str, Aov] = {  # AOVs that measurements have, whose errors come from batches of samples
     LUX: _sampled(3, "photometric light: all, that of broadband lights, that of lights of visible watts"),
 }
-# what follows the name of such an AOV in those of the layers with its error, and the variance of a sample
+# what follows the name of such an AOV in those of its error, and the variance of a sample (Image.measured)
 STANDARD_ERROR, VARIANCE = "_error", "_variance"
 BOXES = "boxes"  # of objects: no array, but `Image.boxes`
 ALL_AOVS = "all"  # stands for all of `AOVS`, and for nothing else

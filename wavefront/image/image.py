@@ -50,8 +50,9 @@ from ..statistics import (
 from ..statistics.scatter import PREFIX as SCATTER
 from .outlines import outline_coverage
 
+MEASURED = "measured."  # before the names of such arrays in files
 FIELDS = ("counts", "variance", "standard_error")  # arrays (H, W, ...) besides rgb, layers and errors
-PARTS = ("rgb", "spp", "metadata", *FIELDS, "layers", "errors", "names", "sums", "scatter")
+PARTS = ("rgb", "spp", "metadata", *FIELDS, "layers", "errors", "names", "sums", "scatter", "measured")
 
 
 class Image(Answers):
@@ -99,6 +100,9 @@ class Image(Answers):
         What `mean` and `wf.compare` need where pixels share paths; otherwise empty. npz files have it, exr
         files do not.
 
+    measured
+        Of measurements: the error of the layer "lux", and the variance of a sample of it.
+
     `counts`, `variance` and `standard_error` are None in an image that was not rendered, `standard_error`
     also in one that was denoised.
 
@@ -131,6 +135,7 @@ class Image(Answers):
         names: Mapping[str, Mapping[int, str]] | None = None,
         sums: PictureSums | None = None,
         scatter: Sequence[Scatter] = (),
+        measured: Mapping[str, NDArray[np.float32]] | None = None,
     ) -> None:
         self.rgb = _checked_pixels(rgb)
         self.spp = spp
@@ -143,6 +148,7 @@ class Image(Answers):
         self.names = {kind: dict(table) for kind, table in (names or {}).items()}
         self.sums = sums
         self.scatter = tuple(scatter)
+        self.measured = dict(measured or {})
 
     @property
     def light_groups(self) -> dict[str, NDArray[np.float32]]:
@@ -528,8 +534,13 @@ class Image(Answers):
                 return film_image(checkpoint.sums, checkpoint.metadata, keep_sums=True)
         found = read_picture(path)
         errors = {name.removeprefix(ERROR): a for name, a in found.arrays.items() if name.startswith(ERROR)}
+        measured = {
+            name.removeprefix(MEASURED): a for name, a in found.arrays.items() if name.startswith(MEASURED)
+        }
         layers = {
-            name: a for name, a in found.arrays.items() if name not in FIELDS and not name.startswith(ERROR)
+            name: a
+            for name, a in found.arrays.items()
+            if name not in FIELDS and not name.startswith((ERROR, MEASURED))
         }
         scatter = {name: array for name, array in found.sums.items() if name.startswith(SCATTER)}
         sums = {name: array for name, array in found.sums.items() if name not in scatter}
@@ -545,6 +556,7 @@ class Image(Answers):
             names=found.info.get("names"),
             sums=restored_sums(os.fspath(path), found.rgb.shape, found.info.get("identity"), sums),
             scatter=restored_scatter(os.fspath(path), found.rgb.shape, scatter),
+            measured=measured,
         )
 
     @suggests_keywords
@@ -809,6 +821,7 @@ class Image(Answers):
         """Return all of the image as files hold it."""
         arrays = {name: getattr(self, name) for name in FIELDS if getattr(self, name) is not None}
         arrays |= self.layers | {ERROR + name: values for name, values in self.errors.items()}
+        arrays |= {MEASURED + name: values for name, values in self.measured.items()}
         info: dict[str, Any] = {"spp": self.spp, "metadata": self.metadata, "names": self.names}
         kept = scatter_arrays(self.scatter)
         if self.sums is None:
@@ -914,8 +927,8 @@ def _add_aovs(image: Image, sums: PictureSums) -> None:
         if found.variance is None:
             image.errors[name] = _of_shape(found.standard_error, width, height)
         else:
-            image.layers[name + STANDARD_ERROR] = _of_shape(found.standard_error, width, height)
-            image.layers[name + VARIANCE] = _of_shape(found.variance, width, height)
+            image.measured[name + STANDARD_ERROR] = _of_shape(found.standard_error, width, height)
+            image.measured[name + VARIANCE] = _of_shape(found.variance, width, height)
     if sums.film.light is not None and "indirect" in image.layers:
         _add_light_tracing(image, sums.film.light)
     if CLAMPED in image.layers:

@@ -216,8 +216,8 @@ class Measurement(Answers):
                 image.spp,
                 image.metadata,
                 counts=image.counts,
-                variance=image.layers[LUX + VARIANCE],
-                standard_error=image.layers[LUX + STANDARD_ERROR],
+                variance=image.measured[LUX + VARIANCE],
+                standard_error=image.measured[LUX + STANDARD_ERROR],
                 layers=layers,
             )
         )
