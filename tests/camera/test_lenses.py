@@ -226,10 +226,34 @@ def test_a_window_is_cut_from_the_picture(kind: str, sampler: str) -> None:
 
 
 def test_cropped_and_resized() -> None:
-    """A window can be taken later; resizing gives the whole picture."""
+    """A window can be taken later; resizing keeps it."""
     camera = CROPPED["pinhole"]().cropped((5, 3, 14, 16))
     assert (camera.size, camera.resolution) == ((9, 13), (23, 17))
-    assert camera.resized((40, 30)).size == (40, 30)
+    assert camera.resized((9, 13)).window == (5, 3, 14, 16)
+    double = camera.resized((18, 26))
+    assert (double.resolution, double.window) == ((46, 34), (10, 6, 28, 32))
+
+
+@pytest.mark.parametrize("size", [(18, 26), (9, 13), (27, 39), (40, 30), (5, 20), (90, 13), (1, 1), (6, 9)])
+@pytest.mark.parametrize("crop", [(5, 3, 14, 16), (0, 0, 23, 1), (0, 0, 9, 17), (20, 10, 23, 17)])
+def test_a_window_of_another_size_shows_the_same_part(
+    size: tuple[int, int], crop: tuple[int, int, int, int]
+) -> None:
+    """Its middle stays where it is, to half a pixel, and its height spans the same angles."""
+    camera = CROPPED["pinhole"]().cropped(crop)
+    other = camera.resized(size)
+    assert other.size == size
+    x0, y0, x1, y1 = crop
+    scale = size[1] / (y1 - y0)
+    ahead = -camera.rotation[:, 2]
+    points = camera.origin + ahead * 9 + np.array([[0, 0, 0], [0.3, 0.2, 0], [-0.5, 0.4, 0.3]])
+    before, after = (each.project(points)[0] for each in (camera, other))
+    middle = np.array([(x0 + x1) / 2, (y0 + y1) / 2])
+    left, top, *_ = other.window
+    expected = (before - middle) * scale + np.array(size) / 2
+    # what is rounded is the height of the whole picture, too, about whose middle the angles are
+    slack = 1 + np.abs(before - middle).max() * 0.5 / 17 * scale
+    assert np.abs(after - (left, top) - expected).max() <= slack
 
 
 def test_window_addresses() -> None:

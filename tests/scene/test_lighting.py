@@ -2,6 +2,7 @@
 
 import tracemalloc
 import warnings
+from typing import Any
 
 import numpy as np
 import pytest
@@ -265,6 +266,28 @@ def test_the_ground_catches_the_shadow(name: str) -> None:
     assert grounded[38, 22:27].mean() < 0.75 * bare[38, 22:27].mean()
 
 
+@pytest.mark.parametrize("background", ["transparent", (0.2, 0.4, 0.8), None])
+def test_of_a_ground_the_shadow_alone_is_seen(background: Any) -> None:
+    """Its opacity is that of a catcher: below the ball, and not beside it; the light on the ball stays."""
+    settings: dict[str, Any] = {"background": background, "progress": False, "spp": 32, "size": (32, 32)}
+    bare, cast = (wf.render(ball(), ground=ground, **settings) for ground in (False, "shadow"))
+    assert cast.metadata["ground"] == "shadow"
+    beside, lit = (slice(29, 32), slice(28, 32)), (slice(8, 14), slice(13, 19))
+    assert cast.rgb[beside] == pytest.approx(bare.rgb[beside], rel=0.8)
+    assert cast.rgb[lit].mean() == pytest.approx(bare.rgb[lit].mean(), rel=0.1)
+    if background == "transparent":
+        assert bare.alpha[31].max() == 0
+        assert 0.05 < cast.alpha[31, :16].mean() < 0.9
+        assert cast.rgb[31].max() == 0
+        assert cast.alpha[2, 2] == 0
+        same = wf.render(ball(), ground=True, **settings)
+        assert same.rgb.tobytes() == cast.rgb.tobytes()
+        assert same.alpha.tobytes() == cast.alpha.tobytes()
+    else:
+        assert cast.rgb[31, :16].mean() < 0.95 * bare.rgb[31, :16].mean()
+        assert wf.render(ball(), ground=True, **settings).metadata["ground"] is True
+
+
 def test_the_ground_is_no_part_of_the_scene() -> None:
     """Neither of its shapes nor of its bounds; it comes after all shapes of the picture."""
     scene = ball()
@@ -319,7 +342,9 @@ def test_scenes_with_a_light_or_a_camera_get_no_ground() -> None:
     lit = wf.Scene([cube()], [wf.Environment(1)])
     assert wf.render(lit, **CHOSEN).metadata["ground"] is False
     assert wf.render(ball(), **CHOSEN).metadata["ground"] is False
-    with pytest.raises(wf.SceneError, match="ground is 'yes'; it must be True or False, or 'auto'"):
+    with pytest.raises(
+        wf.SceneError, match="ground is 'yes'; it must be True or False, or 'shadow', or 'auto'"
+    ):
         wf.render(lit, ground="yes")
 
 

@@ -408,8 +408,19 @@ class Camera(Answers):
         return Camera(eye, axes, projection, self.resolution if size is None else size, window)
 
     def resized(self, size: ImageSize) -> Camera:
-        """Return the same camera for another (width, height), without a crop."""
-        return Camera(self.origin, self.rotation, self.projection, size)
+        """Return the same camera for another (width, height) of what it renders.
+
+        With a crop the same part of the picture is shown, to half a pixel; its height decides the scale.
+        """
+        width, height = image_size(size)
+        if self.size == self.resolution:
+            return Camera(self.origin, self.rotation, self.projection, (width, height))
+        x0, y0, x1, y1 = self.window
+        scale = height / (y1 - y0)
+        columns, left = _rescaled(self.resolution[0], (x0 + x1) / 2, scale, width)
+        rows, top = _rescaled(self.resolution[1], (y0 + y1) / 2, scale, height)
+        crop = left, top, left + width, top + height
+        return Camera(self.origin, self.rotation, self.projection, (columns, rows), crop)
 
     def cropped(self, crop: Window) -> Camera:
         """Return the same camera that renders only the window (x0, y0, x1, y1) of the whole picture."""
@@ -802,6 +813,16 @@ def image_size(size: ImageSize) -> tuple[int, int]:
     if not whole or not (1 <= width <= MAX_SIDE and 1 <= height <= MAX_SIDE):
         raise SceneError(f"size is {size!r}; both must be whole numbers from 1 to {MAX_SIDE}")
     return int(width), int(height)
+
+
+def _rescaled(whole: int, middle: float, scale: float, size: int) -> tuple[int, int]:
+    """Return the pixels along a side of a scaled picture, and the first of `size` of them around a place.
+
+    The side is longer on both ends where they would not fit.
+    """
+    length, first = round(whole * scale), round(middle * scale - size / 2)
+    beyond = max(0, -first, first + size - length)
+    return length + 2 * beyond, first + beyond
 
 
 def _window(crop: Window | None, resolution: tuple[int, int]) -> Window:

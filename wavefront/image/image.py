@@ -66,10 +66,10 @@ class Image(Answers):
         Samples per pixel; the rounded mean where pixels have different numbers.
     metadata
         Settings and results of the render: lighting (the preset that was added, or None), ground (whether one
-        was added), background ("transparent", a color, or None for the environment), integrator, max_bounces,
-        seed, sampler, sample_ranges (the half-open ranges [first, end] of the samples that some pixel has),
-        film (width and height of the whole picture), window (the part [x0, y0, x1, y1] of it that this one
-        is), filter, branches, guide, guided, reuse and hint (what was chosen, and what else may pay:
+        was added, or "shadow"), background ("transparent", a color, or None for the environment), integrator,
+        max_bounces, seed, sampler, sample_ranges (the half-open ranges [first, end] of the samples that some
+        pixel has), film (width and height of the whole picture), window (the part [x0, y0, x1, y1] of it that
+        this one is), filter, branches, guide, guided, reuse and hint (what was chosen, and what else may pay:
         docs/choices.md), accelerator, workers, executor, seconds (wall time), spp (mean over pixels),
         samples, rays, bad_samples, interrupted, version (of this package), numpy, noise (estimated relative
         error of the picture before denoising), rare (the part of the squared error that comes from few

@@ -16,8 +16,9 @@ from numpy.typing import ArrayLike
 from ..arrays.elementary import sin_cos_turns
 from ..arrays.soa import soa
 from ..arrays.vec import Doubles
-from ..bsdfs import Diffuse
+from ..bsdfs import Diffuse, ShadowCatcher
 from ..camera import Camera, upward
+from ..codecs.image_data import TRANSPARENT
 from ..core.errors import SceneError
 from ..core.suggestions import suggests_keywords
 from ..lights import Environment, Light, Sky
@@ -27,6 +28,7 @@ from ..textures.image import Texture
 from .scene import Scene, turned_up
 
 HEIGHT, WIDTH = 128, 256  # pixels of an environment's image
+SHADOW = "shadow"  # a ground of which only the shadow is seen
 GROUND_REACH = 6.0  # radius of the ground in radii of the scene
 GROUND_FADE = 0.25  # width of the faded rim, relative to the ground's radius
 MOST_GROUND = 0.9  # albedo of the ground at most
@@ -244,8 +246,8 @@ def choose_preset(scene: Scene, lighting: str | None) -> str | None:
 
 def choose_ground(
     ground: bool | str, chosen_light: bool, framed: Camera | None, background: object, up: ArrayLike
-) -> bool:
-    """Return whether a ground is added.
+) -> bool | str:
+    """Return whether a ground is added; `SHADOW` for one of which only the shadow on it is seen.
 
     Parameters
     ----------
@@ -256,12 +258,13 @@ def choose_ground(
     framed
         The camera, if it was made to frame the scene.
     background
-        As for `render`; a ground would cover it.
+        As for `render`; a ground would cover it. On a transparent one the shadow is seen.
     up
         What is up: from below, a ground would hide the scene.
     """
-    if not isinstance(ground, str):
-        return ground
+    if not isinstance(ground, str) or ground == SHADOW:
+        seen_through = isinstance(background, str) and background == TRANSPARENT
+        return SHADOW if ground and seen_through else ground
     if not chosen_light or framed is None or background is not None:
         return False
     return bool(framed.rotation[:, 2] @ turned_up(upward("up", up))[:, 1] > -STEEP)
@@ -271,13 +274,13 @@ def lighted(
     scene: Scene,
     preset: str | None,
     *,
-    ground: bool = False,
+    ground: bool | str = False,
     up: ArrayLike = "y",
     camera: Camera | None = None,
 ) -> Scene:
     """Return a copy of the scene with the light of a preset and a ground; the scene itself without both.
 
-    The light is relative to the camera, as in `studio`.
+    The light is relative to the camera, as in `studio`. Of a ground that is `SHADOW` only the shadow is seen.
     """
     if preset is None and not ground:
         return scene
@@ -285,12 +288,13 @@ def lighted(
     if preset is not None:
         complete.lights = [*scene.lights, *studio(preset, up=up, camera=camera)]
     if ground:
-        complete.shapes = [*scene.shapes, _ground(scene, preset, up)]
+        kind = ShadowCatcher if ground == SHADOW else Diffuse
+        complete.shapes = [*scene.shapes, _ground(scene, preset, up, kind)]
     return complete
 
 
-def _ground(scene: Scene, preset: str | None, up: ArrayLike) -> Mesh:
-    """Return a level disk under a scene that fades out towards its rim.
+def _ground(scene: Scene, preset: str | None, up: ArrayLike, kind: type[Diffuse]) -> Mesh:
+    """Return a level disk of a kind of surface under a scene, that fades out towards its rim.
 
     Outside of shadows it is as bright as the lower half of the preset's environment, so neither an edge nor a
     horizon is visible.
@@ -311,7 +315,7 @@ def _ground(scene: Scene, preset: str | None, up: ArrayLike) -> Mesh:
         center - vertical * depth * (1 + GROUND_GAP),
         vertical,
         GROUND_REACH * radius,
-        material=Material(Diffuse(albedo), alpha=Texture(alpha, channel=0, wrap="clamp")),
+        material=Material(kind(albedo), alpha=Texture(alpha, channel=0, wrap="clamp")),
         name="ground",
     )
 

@@ -39,7 +39,7 @@ class PreparedScene:
     preset
         Name of the light that was added; None if there is none.
     ground
-        Whether a ground was added.
+        Whether a ground was added; "shadow" for one of which only the shadow is seen.
     lighted
         The scene with both.
     compiled

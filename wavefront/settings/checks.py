@@ -16,7 +16,7 @@ from ..core.errors import SceneError, in_brief, number, warn_caller
 from ..core.files import check_target
 from ..core.progress import Progress
 from ..core.registry import Registry
-from ..scene.lighting import check_lighting
+from ..scene.lighting import SHADOW, check_lighting
 from ..scene.scene import view_direction
 
 AUTO = "auto"
@@ -69,6 +69,16 @@ def check_flag(name: str, value: Any) -> bool:
     if not isinstance(value, bool | np.bool_):
         raise SceneError(f"{name} is {in_brief(value)}; it must be True or False")
     return bool(value)
+
+
+def check_ground(name: str, value: Any) -> bool | str:
+    """Check that something is True, False or "shadow"."""
+    if isinstance(value, str) and value == SHADOW:
+        return value
+    try:
+        return check_flag(name, value)
+    except SceneError as error:
+        raise SceneError(f"{error}, or {SHADOW!r}") from None
 
 
 def above_zero(name: str, value: Any) -> float:

@@ -38,6 +38,7 @@ from .checks import (
     check_background,
     check_checkpoint,
     check_flag,
+    check_ground,
     check_noise,
     check_preset,
     check_progress,
@@ -177,11 +178,13 @@ class RenderSettings(TypedDict, total=False):
             AUTO,
             "Adds a level ground under the scene. It catches the shadow and fades into the background. It "
             "belongs to the picture alone: the scene, its bounds and the numbers of its shapes stay. "
+            '"shadow" adds one of which the camera sees the shadow alone. So does True where the background '
+            "is transparent, and the shadow is in `alpha`. "
             '"auto" adds it where both light and camera are chosen automatically, unless the camera looks '
             "from below or a `background` is given.",
             option="add a ground that catches the shadow, or leave it out; auto: where light and camera are "
             "chosen automatically",
-            check=auto_or(check_flag),
+            check=auto_or(check_ground),
         ),
     ]
     background: Annotated[
