@@ -104,9 +104,10 @@ if TYPE_CHECKING:
     from .camera.moves import interpolate_cameras, orbit
     from .datasets import write_dataset
     from .image.comparison import Comparison, compare
-    from .io.foreign import from_open3d, from_pyvista
+    from .io.foreign import from_open3d
     from .io.load import from_mitsuba, from_trimesh, load, load_mesh
     from .io.materialx import load_materialx
+    from .io.pyvista_objects import from_pyvista
     from .io.sources import LoadLimits
     from .io.volumes import load_grid
     from .measuring import (
@@ -132,9 +133,10 @@ _LATER = {  # what many programs do without is imported when they ask for it
     ".camera.moves": ("interpolate_cameras", "orbit"),
     ".datasets": ("write_dataset",),
     ".image.comparison": ("Comparison", "compare"),
-    ".io.foreign": ("from_open3d", "from_pyvista"),
+    ".io.foreign": ("from_open3d",),
     ".io.load": ("from_mitsuba", "from_trimesh", "load", "load_mesh"),
     ".io.materialx": ("load_materialx",),
+    ".io.pyvista_objects": ("from_pyvista",),
     ".io.sources": ("LoadLimits",),
     ".io.volumes": ("load_grid",),
     ".measuring": (

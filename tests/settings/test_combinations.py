@@ -29,6 +29,9 @@ VALUES: dict[str, Any] = {  # of each setting, one that is not its default
     "view": "front",
     "fov": 50.0,
     "material": "gold",
+    "scalars": "x",
+    "cmap": "plasma",
+    "clim": (0, 1),
     "smooth": False,
     "up": "z",
     "lighting": "softbox",
@@ -65,7 +68,7 @@ VALUES: dict[str, Any] = {  # of each setting, one that is not its default
 USUAL = {"size": (8, 8), "max_bounces": 4, "lighting": "cloudy", "workers": 1, "progress": False}
 OF_SETTINGS = [each for each in EXCLUSIONS if each.other != MEDIA]  # tests/media has those of scenes
 NAMED = {name for each in EXCLUSIONS for name in (each.one, each.other)}
-QUICK = [name for name in VALUES if name in NAMED and name != "guide"]
+QUICK = [name for name in VALUES if name in NAMED and name not in ("guide", "material")]
 
 
 def given(*names: str) -> dict[str, Any]:
@@ -88,6 +91,7 @@ def glass_on_a_floor() -> wf.Scene:
 def pairs(names: Sequence[str]) -> Iterator[tuple[str, str]]:
     """Yield every pair of these settings that the table does not refuse."""
     refused = [{each.one, each.other} for each in EXCLUSIONS if each.refused]
+    names = [name for name in names if name not in ("scalars", "cmap", "clim")]  # of one bare mesh
     for one, other in combinations(names, 2):
         if {one, other} not in refused and SETTING_OF.get(one, one) != SETTING_OF.get(other, other):
             yield one, other

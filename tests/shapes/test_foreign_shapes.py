@@ -267,7 +267,9 @@ def test_meshes_of_pyvista() -> None:
     assert [len(shape.faces) for shape in wf.from_pyvista(blocks).shapes] == [2, 2]  # type: ignore[attr-defined]
     image = render([poly(), wf.Environment(1)], 1, size=(8, 8), up="z", material=None)
     assert image.shape == (8, 8, 3)
-    with pytest.raises(wf.SceneError, match="expected a PolyData or a grid of PyVista, got PolyData"):
+    with pytest.raises(
+        wf.SceneError, match="expected a PolyData, a grid or a Plotter of PyVista, got PolyData"
+    ):
         wf.from_pyvista(PolyData())
     with pytest.raises(wf.SceneError, match=r"PyVista: .*uses vertex 9"):
         wf.from_pyvista(poly(faces=np.array([3, 0, 1, 9])))

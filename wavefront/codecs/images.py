@@ -346,6 +346,7 @@ IMAGE_READERS: Registry[Decoder] = Registry(
         ".npz": _decode_npz,
     },
     adapt=_checked_pixels,
+    group="read_image",
 )
 IMAGE_WRITERS: Registry[Encoder] = Registry(
     "extension",
@@ -359,6 +360,7 @@ IMAGE_WRITERS: Registry[Encoder] = Registry(
         ".npz": _whole(npz.encode),
     },
     adapt=_colors,
+    group="write_image",
 )
 ALL_OF_IT: dict[str, Callable[[bytes, Budget], ImageData | None]] = {  # formats that hold all of a picture
     ".exr": exr.decode_all,

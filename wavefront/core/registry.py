@@ -4,9 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import is_dataclass
-from typing import Any, Generic, TypeVar
+from functools import cached_property
+from typing import TYPE_CHECKING, Any, Generic, TypeVar
 
 from .errors import SceneError, one_of
+
+if TYPE_CHECKING:
+    from importlib.metadata import EntryPoint
 
 T = TypeVar("T")
 
@@ -26,6 +30,9 @@ class Registry(Mapping[str, T], Generic[T]):
         The built-in ones, by name.
     accepts
         Returns True for an object of this kind; by default for everything that can be called.
+    group
+        The group of entry points by which other packages add to the table, without "wavefront."; by default
+        the name of the setting.
     adapt
         Turns a thing that a user gives into an entry of the table; by default it is one already.
     """
@@ -37,13 +44,32 @@ class Registry(Mapping[str, T], Generic[T]):
         entries: Mapping[str, T],
         accepts: Callable[[Any], bool] = callable,
         adapt: Callable[[Any], T] = lambda thing: thing,
+        group: str | None = None,
     ) -> None:
+        self.group = f"wavefront.{group or setting}"
         self.setting, self.expected = setting, expected
         self._entries, self._accepts, self._adapt = dict(entries), accepts, adapt
 
+    @cached_property
+    def _plugged(self) -> dict[str, EntryPoint]:
+        """The entry points of other packages, by name; a package is imported when its name is used."""
+        from importlib.metadata import entry_points  # here, as its import takes 60 ms
+
+        return {point.name: point for point in entry_points(group=self.group)}
+
     def __getitem__(self, name: str) -> T:
         """Return the thing called `name`."""
+        if name not in self._entries and name in self._plugged:
+            self._load(self._plugged[name])
         return self._entries[name]
+
+    def _load(self, point: EntryPoint) -> None:
+        try:
+            thing = point.load()
+        except Exception as error:  # whatever the other package raises
+            text = f"{self.setting} {point.name!r} of {point.value} cannot be loaded: {error}"
+            raise SceneError(text) from error
+        self.register(point.name, thing)
 
     def __iter__(self) -> Iterator[str]:
         """Go through the names, the built-in ones first."""
@@ -70,7 +96,9 @@ class Registry(Mapping[str, T], Generic[T]):
         """
         if not isinstance(value, str) and self._accepts(value):
             return self._adapt(value)
-        return self._entries[one_of(setting or self.setting, value, self._entries)]
+        if isinstance(value, str) and value in self:
+            return self[value]
+        return self[one_of(setting or self.setting, value, [*self._entries, *self._plugged])]
 
     def label(self, value: Any) -> str:
         """Return the name of what `find` takes: its name in the table, else that of the function or class.

@@ -235,6 +235,7 @@ READERS: Registry[Reader] = Registry(
         **dict.fromkeys((".usd", ".usda", ".usdc", ".usdz"), _read_usd),
     },
     adapt=_from_scene,
+    group="load",
 )
 # formats that are no archives
 PLAIN = (".obj", ".ply", ".stl", ".glb", ".gltf", ".off", ".dae", ".xml", ".pbrt")

@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 from collections.abc import Mapping, Sequence
 from copy import copy
+from dataclasses import replace
 from numbers import Real
 from typing import Any
 
@@ -17,6 +18,7 @@ from ..lights import Light
 from ..materials import Material, MaterialLike, as_material
 from ..scene.scene import AUTO, FRAMING_FOV, FRAMING_VIEW, Scene, importer, register_importer
 from ..shapes import Instance, Mesh, Shape
+from ..shapes.scalars import Coloring, with_scalars
 
 SIZE = (512, 512)  # pixels
 CAN_BE_RENDERED = (
@@ -32,6 +34,7 @@ def as_scene(
     smooth: bool | float | str = AUTO,
     within: tuple[int, ...] = (),
     reading: Mapping[str, Any] | None = None,
+    coloring: Coloring | None = None,
 ) -> Scene:
     """Return what `render` was given as a `Scene`.
 
@@ -49,6 +52,8 @@ def as_scene(
         The lists, by their ids, in which it is.
     reading
         Further arguments of `load`, where it is a path.
+    coloring
+        The numbers that meshes and points show.
 
     Raises
     ------
@@ -58,6 +63,10 @@ def as_scene(
     """
     if material is not None:
         material = as_material("material", material)
+    if coloring is not None:
+        if material is not None:
+            raise SceneError("material and scalars are given, and both say what the surface looks like")
+        return _with_scalars(subject, progress, smooth, within, reading, coloring)
     if isinstance(subject, Scene):
         if material is not None:
             raise SceneError("material is for bare meshes; in a wf.Scene set those of its shapes")
@@ -82,6 +91,42 @@ def as_scene(
         return _joined(subject, material, progress, smooth, (*within, id(subject)))
     what = "an empty list" if isinstance(subject, list | tuple) and not subject else type(subject).__name__
     raise SceneError(f"cannot render {what}: give {CAN_BE_RENDERED}")
+
+
+def _with_scalars(
+    subject: Any,
+    progress: Progress,
+    smooth: bool | float | str,
+    within: tuple[int, ...],
+    reading: Mapping[str, Any] | None,
+    coloring: Coloring,
+) -> Scene:
+    """Return what `render` was given as a `Scene` whose shapes show numbers; arguments as of `as_scene`."""
+    if importer(subject) is _from_pyvista:
+        from .pyvista_objects import from_pyvista
+
+        given = {"scalars": coloring.scalars, "cmap": coloring.cmap, "clim": coloring.clim}
+        return from_pyvista(subject, smooth=smooth, **given)
+    if coloring.scalars is None:
+        raise SceneError("cmap and clim are for scalars; give scalars=..., numbers or the name of some")
+    if isinstance(subject, list | tuple) and not _is_mesh(subject):
+        raise SceneError("scalars are for one mesh or cloud, not for a list; give shapes with colors=, cmap=")
+    known = {
+        **getattr(subject, "face_attributes", {}),
+        **getattr(subject, "vertex_attributes", {}),
+    }
+    if isinstance(coloring.scalars, str) and coloring.scalars in known:
+        coloring = replace(coloring, scalars=known[coloring.scalars])
+    if _is_mesh(subject):  # before vertices are split
+        flat = with_scalars(_mesh_of(subject, None, AUTO), coloring)
+        return as_scene(flat, None, progress, smooth, within, reading)
+    own = isinstance(subject, Shape | Scene)
+    scene = as_scene(subject, None, progress, AUTO if own else smooth, within, reading)
+    if len(scene.shapes) != 1:
+        raise SceneError(f"scalars are for one shape; there are {len(scene.shapes)}")
+    shown = copy(scene)
+    shown.shapes = [with_scalars(scene.shapes[0], coloring)]
+    return shown
 
 
 def choose_camera(
@@ -125,6 +170,15 @@ def choose_camera(
         size = SIZE if scene.camera is None else scene.camera.size
     view, fov = FRAMING_VIEW if view is None else view, FRAMING_FOV if fov is None else fov
     return scene.framing_camera(fov, size, up=up, direction=view, turning=turning), True
+
+
+COLORING = ("scalars", "cmap", "clim")  # settings
+
+
+def coloring_of(values: Mapping[str, Any]) -> Coloring | None:
+    """Return what the settings of `COLORING` say; None where none is given."""
+    given = [values.get(name) for name in COLORING]
+    return None if all(each is None for each in given) else Coloring(*given)
 
 
 def framed(subject: Any, view: Any, fov: float | None, size: Any, up: Any) -> Camera:
@@ -217,7 +271,7 @@ def _imported(geometry: Any, smooth: bool | float | str = AUTO) -> Scene:
 
 
 def _from_pyvista(data: Any, smooth: bool | float | str = AUTO) -> Scene:
-    from .foreign import from_pyvista
+    from .pyvista_objects import from_pyvista
 
     return from_pyvista(data, smooth=smooth)
 

@@ -31,6 +31,7 @@ if TYPE_CHECKING:
 WITHOUT_FACES = {"PointCloud": "Points", "Path2D": "Edges", "Path3D": "Edges"}
 Z_UP = ("stl", "stl_ascii", "3mf")  # formats with z up
 FLAT = ("glb", "gltf")  # formats in which meshes without normals have flat facets
+INVENTED = 102  # code of the colors of trimesh's SimpleMaterial where none are given
 BARE = ("obj", "ply")  # formats whose materials may lack a color; trimesh then invents a gray one
 
 
@@ -274,7 +275,10 @@ def _simple(material: Any, where: str, bare: bool, losses: Losses) -> MaterialSp
     entry = mtl.Entry(where, str(material.name or ""), losses=losses)
     lines = {key: value for key, value in material.kwargs.items() if key != "name"}
     if not bare:
+        plain = material.image is not None  # then a color that was not given is no factor of it
         for key, codes in (("kd", material.diffuse), ("ks", material.specular)):
+            if plain and (np.asarray(codes)[:3] == INVENTED).all():
+                continue
             lines.setdefault(key, [f"{code / 255:.8f}" for code in np.asarray(codes)[:3]])
         lines.setdefault("ns", f"{material.glossiness:.8f}")
     for key, value in lines.items():

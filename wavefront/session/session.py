@@ -21,7 +21,7 @@ from ..core.suggestions import suggests_keywords
 from ..film.checkpoint import Checkpoint
 from ..image import Image
 from ..integrators.tuning import TrialJob, TrialPart
-from ..io.to_scene import as_scene, choose_camera
+from ..io.to_scene import as_scene, choose_camera, coloring_of
 from ..scheduling.accumulator import Accumulator
 from ..scheduling.blas import reserve_buffers
 from ..scheduling.executors import shares_scene
@@ -101,7 +101,13 @@ class Session:
     def _set_up(self, subject: Any, begin: float) -> None:
         """Compile the scene and begin the first picture."""
         values = self._settings.values
-        scene = as_scene(subject, values["material"], values["progress"], values["smooth"])
+        scene = as_scene(
+            subject,
+            values["material"],
+            values["progress"],
+            values["smooth"],
+            coloring=coloring_of(values),
+        )
         settings = self._settings = self._settings.after(scene.settings)
         reserve_buffers(1)
         values = settings.values

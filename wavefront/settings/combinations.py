@@ -41,6 +41,7 @@ EXCLUSIONS = (
     Exclusion("caustics", MEDIA, "paths from lights do not follow them"),
     Exclusion("view", "camera", "a view is framed by a camera of its own"),
     Exclusion("fov", "camera", "a camera has a field of view of its own"),
+    Exclusion("scalars", "material", "both say what the surface looks like"),
     Exclusion("samples", "spp", GIVEN),
     Exclusion("samples", "noise", f"{GIVEN}, and noise decides how many there are"),
     Exclusion("samples", "seconds", f"{GIVEN}, and the time decides how many there are"),

@@ -135,6 +135,27 @@ class RenderSettings(TypedDict, total=False):
             option=f"material in place of the file's: {', '.join(NAMED_MATERIALS)}",
         ),
     ]
+    scalars: Annotated[
+        str | ArrayLike | None,
+        Setting(
+            None,
+            "Numbers that a mesh or points show by the colors of a colormap, one for each vertex, face or "
+            'point; or their name: that of an array of PyVista or trimesh, or "x", "y" or "z". Data of '
+            "PyVista show their active scalars by default.",
+        ),
+    ]
+    cmap: Annotated[
+        Any,
+        Setting(
+            None,
+            'The colormap of the scalars: the name of one of matplotlib, by default "viridis", a colormap, '
+            "or a list of colors.",
+        ),
+    ]
+    clim: Annotated[
+        tuple[float, float] | None,
+        Setting(None, "The scalars at both ends of the colormap; by default the least and the greatest."),
+    ]
     smooth: Annotated[
         bool | float | str,
         Setting(

@@ -19,6 +19,7 @@ from .base import Checked
 from .colored import ColoredShape
 from .smoothing import AUTO, CREASE, check_smooth, crease_normals, facet_normals, split_vertices
 from .transform import moved, moved_tangents
+from .winding import settled
 
 MOST_DOUBLINGS = 60  # log2 of the length, or its inverse, of vectors that are stored unchanged
 AT_ONCE = 1 << 14  # faces whose area is found together, so that they fit the cache
@@ -89,7 +90,9 @@ class Mesh(ColoredShape):
         (m, 3) vertex indices, counter-clockwise seen from the front. No ray hits a face of zero area; a
         warning counts those.
     normals
-        (n, 3) shading normals; without them the facets are flat, unless `smooth` says otherwise.
+        (n, 3) shading normals; without them the facets are flat, unless `smooth` says otherwise. If nearly
+        all oppose the faces, they are turned, or the faces of a closed mesh that face inwards; a warning says
+        so.
     uvs, uvs1
         (n, 2) texture coordinates, and a second set of them.
     tangents
@@ -164,6 +167,8 @@ class Mesh(ColoredShape):
         self.tangents = tangents
         self.colors = colors
         self.check()
+        if self.normals is not None and self.tangents is None:
+            self.faces, self.normals = settled(name, self.vertices, self.faces, self.normals)
         self._warn_of_zero_area()
         if check_smooth(f"{name}: smooth", smooth) is not False:
             if normals is not None:

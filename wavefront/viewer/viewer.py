@@ -14,7 +14,7 @@ from ..codecs.tone import TONES
 from ..core.errors import RenderError, SceneError, one_of
 from ..core.suggestions import suggests_keywords
 from ..image import Image
-from ..io.to_scene import as_scene, choose_camera
+from ..io.to_scene import COLORING, as_scene, choose_camera, coloring_of
 from ..scene import Scene
 from ..scheduling.executors import choose_executor, needs_pickling, worker_count
 from ..session import Session
@@ -259,7 +259,11 @@ def view(
         spp = DEFAULT_SPP
     token = token_of(token)
     one_of("tone", tone, TONES)
-    subject = as_scene(scene, settings.pop("material", None), smooth=settings.pop("smooth", "auto"))
+    coloring = coloring_of(settings)
+    for name in COLORING:
+        settings.pop(name, None)  # type: ignore[misc]
+    material, smooth = settings.pop("material", None), settings.pop("smooth", "auto")
+    subject = as_scene(scene, material, smooth=smooth, coloring=coloring)
     viewer = _opened(subject, spp, host, port, token, tone, settings)
     in_notebook = in_kernel()
     if in_notebook:

@@ -1,0 +1,1 @@
+"""What other packages find of this one by entry points."""
