@@ -801,9 +801,10 @@ def test_load_mesh_keeps_colors_and_the_second_uvs(write):
 
 def test_from_trimesh_takes_normals_that_are_there():
     flat, smooth = trimesh.creation.icosphere(1), trimesh.creation.icosphere(1)
-    smooth.vertex_normals = -smooth.vertices
+    tilted = smooth.vertices + (0, 0, 0.5)
+    smooth.vertex_normals = tilted / np.linalg.norm(tilted, axis=1, keepdims=True)
     assert from_trimesh(flat, smooth=False).shapes[0].normals is None
-    assert from_trimesh(smooth).shapes[0].normals == pytest.approx(-smooth.vertices)
+    assert from_trimesh(smooth).shapes[0].normals == pytest.approx(smooth.vertex_normals)
 
 
 def test_several_materials_of_one_trimesh_object_are_named():

@@ -530,8 +530,8 @@ def test_bad_arguments_are_named(arguments, message):
 
 
 def test_bad_materials_are_named():
-    with pytest.raises(wf.SceneError, match=r"leaf: material is 'red', a color and no material"):
-        wf.Instance(TRIANGLE, np.eye(4), material="red", name="leaf")
+    with pytest.raises(wf.SceneError, match=r"leaf: material is 'reed'; it must be one of"):
+        wf.Instance(TRIANGLE, np.eye(4), material="reed", name="leaf")
     leaf = wf.Instance(TRIANGLE, np.eye(4))
     with pytest.raises(wf.SceneError, match=r"tri: material must be a material .*, got 3"):
         leaf.material = 3
