@@ -801,7 +801,7 @@ def test_load_mesh_keeps_colors_and_the_second_uvs(write):
 
 def test_from_trimesh_takes_normals_that_are_there():
     flat, smooth = trimesh.creation.icosphere(1), trimesh.creation.icosphere(1)
-    tilted = smooth.vertices + (0, 0, 0.5)
+    tilted = smooth.vertices + np.array([0, 0, 0.5])
     smooth.vertex_normals = tilted / np.linalg.norm(tilted, axis=1, keepdims=True)
     assert from_trimesh(flat, smooth=False).shapes[0].normals is None
     assert from_trimesh(smooth).shapes[0].normals == pytest.approx(smooth.vertex_normals)
