@@ -25,11 +25,15 @@ def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 
 def test_a_grid_becomes_a_table(capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["measure", "scene.obj", "--grid", GRID, *SETTINGS]) == 0
-    assert capsys.readouterr().out.startswith("out.csv: irradiance at 6 points, estimated error ")
+    said = capsys.readouterr().out
+    assert said.startswith("out.csv: irradiance at 6 points, estimated error ")
     table = np.genfromtxt("out.csv", delimiter=",", names=True)
     points, normals = wf.grid_points((-1, -1, 0), (2, 0, 0), (0, 2, 0), (3, 2))
     found = wf.measure("scene.obj", points, normals, spp=8, lighting="studio", progress=False)
     assert (table["g"].astype(np.float32) == found.value[:, 1]).all()
+    assert (table["lux"].astype(np.float32) == found.lux).all()
+    assert (table["lux_error"].astype(np.float32) == found.lux_error).all()
+    assert f"{found.lux.max():.3g} lux" in said or f"{found.lux.max():.0f} lux" in said
     assert (np.stack([table[axis] for axis in "xyz"], 1) == points).all()
 
 

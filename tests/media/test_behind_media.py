@@ -101,6 +101,15 @@ def test_what_glass_shows_is_no_background() -> None:
     assert not image.rgb.any()
 
 
+@pytest.mark.parametrize("kind", ["absorption", "both"])
+def test_a_camera_within_a_medium(kind: str) -> None:
+    """Half of a slab is before it."""
+    camera = wf.Camera.look_at((0, 0, 0), (0, 0, -4), fov=3.2, size=(4, 4))
+    image = seen([slab(kind)], background=WHITE, camera=camera)
+    agrees(image, image.rgb, np.exp(-RGB / 2))
+    agrees(image, image.alpha, 1 - np.exp(-RGB / 2).mean())
+
+
 def test_endless_media_hide_all_of_a_background() -> None:
     scene = wf.Scene([wf.Sphere((0, 9, 0), 0.1)], medium=wf.Medium(0.1))
     given = {"lighting": None, "background": WHITE, **QUIET}
@@ -176,6 +185,18 @@ def test_light_in_a_medium_and_a_catcher_in_it() -> None:
     agrees(image, image.alpha, due)
     behind = seen([room, floor, pane], [wf.PointLight((0, 2, 0), 9)], spp=4, camera=ASIDE, max_bounces=0)
     assert (behind.alpha == 1).all()
+
+
+@pytest.mark.parametrize("kind", ["absorption", "both"])
+def test_a_catcher_below_water(kind: str) -> None:
+    """The sun comes through a layer of 2 above the floor, and the camera looks through it."""
+    sigma = 0.3
+    medium = wf.Medium(sigma) if kind == "absorption" else wf.Medium(sigma / 2, sigma / 2)
+    water = wf.Box((0, 0.5, 0), (24, 3, 24), material=wf.Material(wf.NullSurface(), interior=medium))
+    floor = wf.Rectangle((-9, 0, -9), (0, 0, 18), (18, 0, 0), material=wf.ShadowCatcher())
+    camera = wf.Camera.look_at((0, 9, 0.01), (0, 0, 0), fov=3.2, size=(4, 4))
+    image = seen([water, floor], [SUNS["sun"]], spp=512, camera=camera, max_bounces=0)
+    agrees(image, image.alpha, 1 - np.exp(-2 * sigma) * np.exp(-3 * sigma))
 
 
 def test_colored_shadows_count_by_their_luminance() -> None:
