@@ -468,29 +468,6 @@ def test_colors_outside_their_range_are_clamped(write):
         one(write, "Kd 1.5 -1 0.5", strict=True)
 
 
-@pytest.mark.parametrize(
-    ("lines", "message"),
-    [
-        ("Kd red", r"s\.mtl line 2: Kd is 'red'; it must be numbers"),
-        ("Kd nan 0 0", r"line 2: Kd is 'nan 0 0'; it must be finite"),
-        ("Kd 0 0", r"line 2: Kd has 2 numbers; a color has 1 or 3"),
-        ("Kd", r"line 2: Kd is ''"),
-        ("illum 4\nNi 0", r"line 3: Ni is 0; an index must be above 0"),
-        ("illum 4\nNi 1e30", r"line 3: Ni is 1e\+30; an index must be above 0, from 1e-06 to 1e\+06"),
-        ("illum 4\nNi -1", r"line 3: Ni is -1"),
-    ],
-)
-def test_malformed_values_are_errors(write, lines, message):
-    with pytest.raises(SceneError, match=message):
-        one(write, lines)
-
-
-def test_a_property_before_newmtl(write):
-    path = write(f"mtllib s.mtl\n{SQUARE}f 1 2 3\n", s_mtl="Kd 1 1 1\n")
-    with pytest.raises(SceneError, match=r"s\.mtl line 1: Kd stands before the first newmtl"):
-        load_meshes(path)
-
-
 def test_names_with_spaces_and_several_libraries(write):
     path = write(
         f"mtllib a b.mtl\nmtllib c.mtl\n{SQUARE}usemtl my red  \nf 1 2 3\nusemtl other\nf 1 3 4\n",

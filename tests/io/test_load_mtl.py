@@ -80,18 +80,147 @@ def test_options_without_effect_are_named(one):
         assert same(one("map_Kd -imfchan r t.png").material.bsdf.reflectance)
 
 
+def noted(one, lines, message):
+    """Load a material of which one thing is noted, and with `strict` refused."""
+    with pytest.warns(UserWarning, match=message) as record:
+        mesh = one(*lines)
+    assert len(record) == 1
+    with pytest.raises(SceneError, match=message):
+        one(*lines, strict=True)
+    return mesh.material
+
+
 @pytest.mark.parametrize(
     ("line", "message"),
     [
-        ("map_Kd -foo 1 t.png", r"s\.mtl line 2: map_Kd has the option '-foo', which is not known"),
-        ("map_Kd -s 2", r"line 2: map_Kd names no file"),
-        ("map_Kd -mm a b t.png", r"line \d+: map_Kd: -mm is 'a b'; it must be numbers"),
-        ("map_Pr -imfchan q t.png", r"line \d+: map_Pr: -imfchan is 'q'; it must be one of r, g, b, m, l"),
+        ("map_Kd -foo 1 t.png", r"not honored: s\.mtl, material 'm': -foo of map_Kd$"),
+        ("map_Kd -mm a b t.png", r"s\.mtl line \d: map_Kd is with -mm a b; without that option$"),
+        ("map_Kd -s nan 1 t.png", r"s\.mtl line \d: map_Kd is with -s nan 1; without that option$"),
     ],
 )
-def test_defects_of_maps(one, line, message):
-    with pytest.raises(SceneError, match=message):
-        one(line)
+def test_damaged_options_cost_no_more_than_themselves(one, line, message):
+    assert same(noted(one, [line], message).bsdf.reflectance)
+
+
+def test_a_channel_that_does_not_exist(one):
+    found = noted(one, ["Pm 1", "map_Pr -imfchan q t.png"], "map_Pr is with -imfchan q; without that option$")
+    assert same(found.bsdf.roughness, srgb=False, channel="luminance")
+
+
+@pytest.mark.parametrize("line", ["map_Kd", "map_Kd ", "map_Kd -s 2", "map_bump", "map_d", "norm ", "map_Pr"])
+def test_blank_maps_are_left_out(one, line):
+    found = noted(
+        one, ["Kd 0.3 0.3 0.3", line], rf"s\.mtl line 3: {line.split()[0]} is without a file; left out$"
+    )
+    assert found.bsdf.reflectance.ravel() == pytest.approx([0.3] * 3)
+    assert (found.normal_map, found.opacity) == (None, None)
+
+
+def test_blank_maps_that_are_not_read_are_named(one):
+    noted(one, ["Kd 0.3 0.3 0.3", "refl "], "not honored: .*: refl$")
+
+
+GRAY = [0.3] * 3
+
+
+@pytest.mark.parametrize(
+    ("lines", "message", "reflectance"),
+    [
+        (["Kd red"], r"s\.mtl line 2: Kd is 'red'; left out$", [0.5] * 3),
+        (["Kd nan 0 0"], "Kd is 'nan 0 0'; left out$", [0.5] * 3),
+        (["Kd 1e400 0 0"], "left out$", [0.5] * 3),
+        (["Kd 1,0 0,5 0,5"], "Kd is '1,0 0,5 0,5'; left out$", [0.5] * 3),
+        (["Kd 0 0"], "Kd is '0 0'; left out$", [0.5] * 3),
+        (["Kd"], "Kd is ''; left out$", [0.5] * 3),
+        (["Kd spectral a.rfl"], "Kd is 'spectral a.rfl'; left out$", [0.5] * 3),
+        (["Kd .3 .3 .3 1"], r"Kd is '\.3 \.3 \.3 1'; the first three in its place$", GRAY),
+        (["Kd .3 .3 .3", "Ns nan"], "Ns is 'nan'; left out$", GRAY),
+        (["Kd .3 .3 .3", "Ks 1 1", "Ns 9"], "Ks is '1 1'; left out$", GRAY),
+        (["Kd .3 .3 .3", "Ke a"], "Ke is 'a'; left out$", GRAY),
+        (["Kd .3 .3 .3", "illum"], "illum is ''; left out$", GRAY),
+        (["Kd .3 .3 .3", "illum nan"], "illum is 'nan'; left out$", GRAY),
+        (
+            ["Kd .3 .3 .3", "Ni 0", "d 0.5"],
+            "Ni is '0'; left out, as an index must be above 0, from 1e-06",
+            GRAY,
+        ),
+        (["Kd .3 .3 .3", "d 1.5"], r"d is '1\.5'; clamped, as it must be in \[0, 1\]$", GRAY),
+        (["Kd .3 .3 .3", "Tr -2"], r"Tr is '-2'; clamped", GRAY),
+        (
+            ["Kd .3 .3 .3", "d -halo .6"],
+            "d is '-halo .6'; the same opacity from all sides in its place$",
+            GRAY,
+        ),
+        (["Kd .3 .3 .3", "d -halo"], "d is '-halo'; left out$", GRAY),
+    ],
+)
+def test_damaged_lines_cost_no_more_than_themselves(one, lines, message, reflectance):
+    found = noted(one, lines, message)
+    assert isinstance(found.bsdf, Diffuse)
+    assert found.bsdf.reflectance.ravel() == pytest.approx(reflectance)
+    opacity = {"d 0.5": 0.5, "d -halo .6": 0.6}.get(lines[-1])
+    assert (None if found.opacity is None else found.opacity.constant) == pytest.approx(opacity)
+
+
+def test_an_index_that_is_none(one):
+    assert noted(one, ["illum 4", "Ni -1"], "Ni is '-1'; left out").bsdf.ior == pytest.approx(1.5)
+    assert noted(one, ["illum 4", "Ni 1e30"], "Ni is '1e30'; left out").bsdf.ior == pytest.approx(1.5)
+
+
+def test_colors_in_xyz(one):
+    """D65 white of half the brightness is gray."""
+    found = one("Kd xyz 0.4752 0.5 0.5445", strict=True).material.bsdf.reflectance.ravel()
+    assert found == pytest.approx([0.5] * 3, abs=1e-3)
+    red = noted(one, ["Kd xyz 0.4124 0.2126 0.0193"], "Kd is .*; clamped").bsdf.reflectance.ravel()
+    assert red == pytest.approx([1, 0, 0], abs=1e-3)
+
+
+def test_a_line_before_newmtl_is_left_out(one, tmp_path):
+    (tmp_path / "t.mtl").write_text("Kd 1 0 0\nnewmtl m\nKd .3 .3 .3\n")
+    (tmp_path / "b.obj").write_text("mtllib t.mtl\nv 0 0 0\nv 1 0 0\nv 0 1 0\nusemtl m\nf 1 2 3\n")
+    with pytest.warns(UserWarning, match=r"t\.mtl line 1: Kd is before the first newmtl; left out$"):
+        (mesh,) = load_meshes(tmp_path / "b.obj")
+    assert mesh.material.bsdf.reflectance.ravel() == pytest.approx(GRAY)
+
+
+@pytest.mark.parametrize(
+    ("line", "names"),
+    [
+        ("a.mtl b.mtl", ["a.mtl", "b.mtl"]),
+        ("a.mtl \t b c.MTL", ["a.mtl", "b c.MTL"]),
+        ('"a b.mtl"', ["a b.mtl"]),
+        ("a b.mtl c.mtl", ["a b.mtl c.mtl"]),
+        ("a.mtl gone.mtl", ["a.mtl"]),
+    ],
+)
+def test_several_material_files_on_one_line(tmp_path, line, names):
+    faces = ""
+    for number, name in enumerate(names):
+        (tmp_path / name).write_text(f"newmtl m{number}\nKd .3 .3 .3\n")
+        faces += f"usemtl m{number}\nf 1 2 3\n"
+    (tmp_path / "a.obj").write_text(f"mtllib {line}\nv 0 0 0\nv 1 0 0\nv 0 1 0\n{faces}")
+    if "gone" in line:
+        with pytest.warns(UserWarning, match=r"material file 'gone\.mtl' is missing"):
+            meshes = load_meshes(tmp_path / "a.obj")
+    else:
+        meshes = load_meshes(tmp_path / "a.obj", strict=True)
+    assert len(meshes) == len(names)
+    for mesh in meshes:
+        assert mesh.material.bsdf.reflectance.ravel() == pytest.approx(GRAY)
+
+
+OPAQUE = ["Kd 0.8 0.1 0.1", "Kd 0.8 0.1 0.1\nd 1.0", "Kd 1 1 1\nmap_Kd t.png\nd 1.0", "map_Kd t.png", "d 1"]
+OPAQUE += ["Kd 0.8 0.1 0.1\nNi 1.0", "Kd 0.8 0.1 0.1\nKs 1 1 1\nNs 50", "Kd 0 0 0\nmap_Kd t.png"]
+CLEAR = ["", "Kd 0.8 0.1 0.1\nNi 1.33", "Kd 0.8 0.1 0.1\nTf 1 0.9 0.9", "Kd 0.8 0.1 0.1\nd 0.2\nNi 1.5"]
+CLEAR += ["Kd 0 0 0", "Kd 0.8 0.1 0.1\nd 0.5"]
+
+
+@pytest.mark.parametrize("illum", [4, 6, 7, 9])
+@pytest.mark.parametrize("lines", [*OPAQUE, *CLEAR])
+def test_illum_of_glass_on_what_is_opaque(one, illum, lines):
+    """Some programs, such as Cinema 4D, write it for all materials."""
+    bsdf = one(*lines.split("\n"), f"illum {illum}", strict=True).material.bsdf
+    assert isinstance(bsdf, Dielectric) == (lines in CLEAR)
 
 
 @pytest.mark.parametrize(
@@ -215,16 +344,20 @@ def test_a_bump_map_that_looks_like_normals_is_one(one, tmp_path):
 
 
 @pytest.mark.parametrize(
-    ("line", "message"),
+    ("line", "message", "kind"),
     [
-        ("bump -bm x t.png", r"s\.mtl line 2: bump: .*-bm is 'x'; it must be numbers|-bm is 'x'"),
-        ("norm -s 0 t.png", r"s\.mtl line 2: norm: NormalMap: the transform of .* is singular"),
-        ("bump -bm nan t.png", r"s\.mtl line 2: bump: BumpMap height is nan"),
+        ("bump -bm x t.png", "bump is with -bm x; without that option$", BumpMap),
+        ("bump -bm nan t.png", "bump is with -bm nan; without that option$", BumpMap),
+        (
+            "norm -s 0 t.png",
+            r"s\.mtl line 2: norm: NormalMap: the transform of .* singular; .*; left out$",
+            None,
+        ),
     ],
 )
-def test_defects_of_normal_maps(one, line, message):
-    with pytest.raises(SceneError, match=message):
-        one(line)
+def test_defects_of_normal_maps(one, line, message, kind):
+    found = noted(one, [line], message).normal_map
+    assert found is None if kind is None else isinstance(found, kind)
 
 
 @pytest.mark.filterwarnings(r"ignore:.*s\.mtl. not honored")

@@ -4,7 +4,9 @@ How an MTL material is read:
 
 - `Ke` is emission. `Kd` is the reflectance of a matte surface, multiplied by `map_Kd`; a black `Kd`
   beside a `map_Kd` counts as white, since some exporters write that.
-- `illum` 4, 6, 7 and 9 are glass with the index `Ni` (1.5 when absent), tinted by `Tf`, rough by `Pr`.
+- `illum` 4, 6, 7 and 9 are glass with the index `Ni` (1.5 when absent), tinted by `Tf`, rough by `Pr`. But
+  some programs write one of these for all materials: without a `Tf` or an `Ni` other than 1, a surface that
+  has a `d 1`, a `map_Kd`, or a `Kd` that is not black and no less opacity, is none.
 - `illum` 3, 5 and 8 are mirrors of reflectance `Ks`, if `Ks` is not black and there is no `Pr` or `Pm`.
 - `illum` 0 and 1 mean no highlight, and so does an `Ns` of 0, which MeshLab writes beside `Ks 1 1 1`: such a
   surface is matte, whatever its `Ks`.
@@ -24,6 +26,7 @@ How an MTL material is read:
   units. But an image that looks like a normal map is one, because Blender writes normal maps so, and `-bm` is
   then its strength.
 - `Ns` affects only the gloss, and `Ni` only glass.
+- A line that is damaged is left out, which is noted. `Kd xyz` and the like are CIE XYZ.
 - An image that is missing or damaged is noted. `map_Kd` is gray then, and other maps are left out; so is the
   emission of a `map_Ke`.
 - `map_d` counts by the alpha of its image, and by its luminance where it has none.
@@ -43,14 +46,15 @@ import numpy as np
 
 from ..arrays.vec import Doubles
 from ..bsdfs import Dielectric, Diffuse, Mirror
-from ..core.errors import SceneError, exact, printable
+from ..core.errors import SceneError, exact, passed_limit, printable
 from ..materials import Material
 from ..textures.image import Texture
 from ..textures.normal_map import BaseNormalMap, BumpMap, NormalMap
-from ..textures.parameter import MAX_INDEX
 from .appearance import MaterialSpec, build_material
 from .losses import Losses
+from .mtl_checks import COLORS, LEFT_OUT, NUMBERS, mended
 from .sources import GRAY, SceneFiles
+from .text_lines import NUMBER
 
 # values of `illum`
 GLASS = (4, 6, 7, 9)
@@ -112,19 +116,36 @@ class Entry:
         """Return whether any of the keywords occurs."""
         return any(key in self.lines for key in keys)
 
+    def leave_out(self, key: str, error: SceneError) -> None:
+        """Leave out a line that cannot be read, which is noted."""
+        if passed_limit(error):
+            raise error
+        self.losses.note(str(error).removeprefix(f"{self.where(key)}: "), self.where(key), done=LEFT_OUT)
+        del self.lines[key]
+
+    def mend(self) -> None:
+        """Replace or leave out lines that are damaged, and read the images of maps."""
+        for key, (keyword, number, rest) in list(self.lines.items()):
+            if key in COLORS or key in NUMBERS:
+                better, done = mended(key, rest)
+                if done:
+                    self.note(key, repr(rest), done)
+                if better is None:
+                    del self.lines[key]
+                else:
+                    self.lines[key] = keyword, number, better if done or "xyz" in rest else rest
+            elif key in MAPS and key not in self.images and not _map(self, key)[1]:
+                self.note(key, "without a file", LEFT_OUT)
+                del self.lines[key]
+            elif key in MAPS:
+                self.read_image(key)
+
     def numbers(self, key: str) -> list[float] | None:
-        """Return the finite numbers of a line, None if there is no such line."""
+        """Return the numbers of a line, None if there is no such line."""
         if key not in self.lines:
             return None
-        rest = self.lines[key][2].partition("#")[0].strip()
-        try:
-            values = [float(word) for word in rest.split()]
-        except ValueError:
-            raise SceneError(f"{self.where(key)} is {rest!r}; it must be numbers") from None
-        if not values or not np.isfinite(values).all():
-            raise SceneError(f"{self.where(key)} is {rest!r}; it must be finite numbers")
         self.read.add(key)
-        return values
+        return [float(word) for word in self.lines[key][2].partition("#")[0].split()]
 
     def number(self, key: str, default: float) -> float:
         """Return the first number of a line."""
@@ -136,8 +157,6 @@ class Entry:
         values = self.numbers(key)
         if values is None:
             return np.full(3, default)
-        if len(values) not in (1, 3):
-            raise SceneError(f"{self.where(key)} has {len(values)} numbers; a color has 1 or 3")
         color = np.broadcast_to(np.array(values), 3)
         limited = np.clip(color, 0, high)
         if (limited != color).any():
@@ -149,9 +168,7 @@ class Entry:
         """Return the texture of a map of the kind "color", "scalar" or "data", None if there is none."""
         if key not in self.lines:
             return None
-        options, name = _map(self, key)
-        if not name:
-            raise SceneError(f"{self.where(key)} names no file")
+        options, _ = _map(self, key)
         self.read.add(key)
         base, gain = self._option(key, options, "-mm", [0.0, 1.0])
         transform = self._placing(key, options)
@@ -167,7 +184,8 @@ class Entry:
                 offset=np.asarray(scale) * base,
             )
         except SceneError as error:
-            raise SceneError(f"{self.where(key)}: {error}") from error
+            self.leave_out(key, error)
+            return None
 
     def read_image(self, key: str) -> None:
         """Read the image of a map, unless that was done; without one the map is left out, or gray."""
@@ -197,12 +215,10 @@ class Entry:
     ) -> list[float]:
         """Return the numbers of an option of a map; those that are not written are the last of `default`."""
         words = options.get(name, [])
-        try:
-            found = [float(word) for word in words]
-        except ValueError:
-            raise SceneError(
-                f"{self.where(key)}: {name} is {' '.join(words)!r}; it must be numbers"
-            ) from None
+        found = [float(word) for word in words if NUMBER.fullmatch(word)]
+        if len(found) < len(words) or not np.isfinite(found).all():
+            self.note(key, f"with {name} {' '.join(words)}", "without that option")
+            found = []
         return found + default[len(found) :]
 
     def _placing(self, key: str, options: dict[str, list[str]]) -> Doubles | None:
@@ -222,9 +238,8 @@ class Entry:
         has_alpha = key == "map_d" and self.images[key].codes.shape[2] in (2, 4)
         word = options.get("-imfchan", ["m" if has_alpha else "l"])[0]
         if word not in CHANNELS:
-            raise SceneError(
-                f"{self.where(key)}: -imfchan is {word!r}; it must be one of {', '.join(CHANNELS)}"
-            )
+            self.note(key, f"with -imfchan {word}", "without that option")
+            word = "m" if has_alpha else "l"
         return CHANNELS[word]
 
     def unread(self) -> list[str]:
@@ -246,13 +261,7 @@ def _spellings(value: float) -> set[str]:
 def parse(
     path: str | os.PathLike[str], text: str, losses: Losses, files: SceneFiles | None = None
 ) -> dict[str, Entry]:
-    """Split MTL text into materials; a name may contain spaces. Their maps are among `files`.
-
-    Raises
-    ------
-    SceneError
-        If a property stands before the first `newmtl`.
-    """
+    """Split MTL text into materials; a name may contain spaces. Their maps are among `files`."""
     file, entries = os.fspath(path), {}
     current: Entry | None = None
     for number, line in enumerate(text.split("\n"), 1):
@@ -263,7 +272,7 @@ def parse(
         if key == "newmtl":
             current = entries[rest] = Entry(file, rest, losses=losses, files=files)
         elif current is None:
-            raise SceneError(f"{file} line {number}: {keyword} stands before the first newmtl")
+            losses.note(keyword, f"{file} line {number}", "before the first newmtl", LEFT_OUT)
         else:
             current.lines[key] = (keyword, number, rest)
     return entries
@@ -277,13 +286,7 @@ def _split(line: str) -> tuple[str, str]:
 
 
 def specs(entries: dict[str, Entry], losses: Losses) -> dict[str, MaterialSpec]:
-    """Convert entries to materials; unsupported properties are noted.
-
-    Raises
-    ------
-    SceneError
-        If a value is malformed.
-    """
+    """Convert entries to materials; unsupported properties are noted."""
     out: dict[str, MaterialSpec] = {}
     unread: dict[str, str] = {}
     for name, entry in entries.items():
@@ -299,8 +302,7 @@ def specs(entries: dict[str, Entry], losses: Losses) -> dict[str, MaterialSpec]:
 
 def spec(entry: Entry) -> MaterialSpec:
     """Convert one entry to a material; the keywords that it uses are added to `entry.read`."""
-    for key in [key for key in entry.lines if key in MAPS]:
-        entry.read_image(key)
+    entry.mend()
     factor = entry.color("ke", 0.0, high=np.inf)
     if "map_ke" in entry.lines and not factor.any():
         factor = np.ones(3)
@@ -317,7 +319,7 @@ def _material(entry: Entry) -> tuple[Material, list[str]]:
         entry.read.discard("illum")
     ior = entry.number("ni", 1.0)
     extended = entry.has(*(key for keys in PBR for key in keys[:2]))
-    if illum in GLASS or (alpha_of_entry(entry) < 1 and ior != 1 and "map_d" not in entry.lines):
+    if _is_glass(entry, illum, ior):
         return Material(_glass(entry)), []
     if illum in MIRROR and not extended and "ks" in entry.lines and entry.color("ks", 0.0).any():
         return Material(Mirror(entry.color("ks", 0.0)), alpha=_alpha(entry)), []
@@ -328,6 +330,15 @@ def _material(entry: Entry) -> tuple[Material, list[str]]:
         # a default gloss would be an invention if the file has none
         material, lost = build_material({**wanted, "roughness": 1.0, "specular": 0.0})
     return material, lost
+
+
+def _is_glass(entry: Entry, illum: int, ior: float) -> bool:
+    if alpha_of_entry(entry) < 1 and ior != 1 and "map_d" not in entry.lines:
+        return True
+    if illum not in GLASS or "tf" in entry.lines or ior != 1 or alpha_of_entry(entry) < 1:
+        return illum in GLASS
+    kd = entry.color("kd", 0.0)
+    return not ("map_kd" in entry.lines or "d" in entry.lines or kd.any())
 
 
 def _gloss(entry: Entry, illum: int, physical: bool) -> dict[str, Any]:
@@ -391,32 +402,31 @@ def _alpha(entry: Entry) -> Any:
 
 def _normal_or_bump_map(entry: Entry) -> BaseNormalMap | None:
     """Return the normal map or bump map. If there are both, only `norm` is read."""
-    if "norm" in entry.lines:
-        return _made(entry, "norm", _normal_map)
-    for key in ("map_bump", "bump"):
+    for key in ("norm", "map_bump", "bump"):
         if key in entry.lines:
-            return _made(entry, key, _normal_map if _looks_like_normals(entry, key) else _bump_map)
+            is_normal = key == "norm" or _looks_like_normals(entry, key)
+            made = _made(entry, key, _normal_map if is_normal else _bump_map)
+            if made is not None:
+                return made
     return None
 
 
-def _made(entry: Entry, key: str, make: Callable[[Entry, str], BaseNormalMap]) -> BaseNormalMap:
+def _made(entry: Entry, key: str, make: Callable[[Entry, str], BaseNormalMap | None]) -> BaseNormalMap | None:
     try:
         return make(entry, key)
     except SceneError as error:
-        where = entry.where(key)
-        raise error if where in str(error) else SceneError(f"{where}: {error}") from error
+        entry.leave_out(key, error)
+        return None
 
 
-def _normal_map(entry: Entry, key: str) -> NormalMap:
+def _normal_map(entry: Entry, key: str) -> NormalMap | None:
     texture = entry.texture(key, kind="data")
-    assert texture is not None
-    return NormalMap(texture, entry.multiplier(key))
+    return None if texture is None else NormalMap(texture, entry.multiplier(key))
 
 
-def _bump_map(entry: Entry, key: str) -> BumpMap:
+def _bump_map(entry: Entry, key: str) -> BumpMap | None:
     texture = entry.texture(key, kind="scalar")
-    assert texture is not None
-    return BumpMap(texture, entry.multiplier(key))
+    return None if texture is None else BumpMap(texture, entry.multiplier(key))
 
 
 def _looks_like_normals(entry: Entry, key: str) -> bool:
@@ -424,8 +434,7 @@ def _looks_like_normals(entry: Entry, key: str) -> bool:
     if "-imfchan" in _map(entry, key)[0]:
         return False
     texture = entry.texture(key, kind="data")
-    assert texture is not None
-    if texture.channels < 3:
+    if texture is None or texture.channels < 3:
         return False
     red, green, blue = texture.mean()
     return abs(red - 0.5) < 0.1 and abs(green - 0.5) < 0.1 and blue > 0.75
@@ -433,17 +442,15 @@ def _looks_like_normals(entry: Entry, key: str) -> bool:
 
 def _base(entry: Entry) -> Any:
     color = entry.color("kd", 1.0 if "map_kd" in entry.lines else MATTE)
-    if "map_kd" not in entry.lines:
-        return color
-    return entry.texture("map_kd", color if color.any() else 1.0)
+    texture = entry.texture("map_kd", color if color.any() else 1.0)
+    if texture is None:
+        return entry.color("kd", MATTE)
+    return texture
 
 
 def _glass(entry: Entry) -> Dielectric:
     alpha_of_entry(entry)
     ior = entry.number("ni", GLASS_IOR)
-    if not 1 / MAX_INDEX <= ior <= MAX_INDEX:
-        limits = f"above 0, from {1 / MAX_INDEX:g} to {MAX_INDEX:g}"
-        raise SceneError(f"{entry.where('ni')} is {exact(ior)}; an index must be {limits}")
     entry.read.update(("d", "tr", "kd"))  # glass has no matte part, but files give it a Kd
     return Dielectric(ior, _part(entry, "pr", 0.0), transmittance=entry.color("tf", 1.0))
 
@@ -465,10 +472,8 @@ def _map(entry: Entry, key: str) -> tuple[dict[str, list[str]], str]:
         words, count = rest.split(), OPTIONS.get(option)
         if count is None:
             count = 0
-            while count < 3 and count < len(words) and _is_number(words[count]):
+            while count < 3 and count < len(words) and NUMBER.fullmatch(words[count]):
                 count += 1
-            if option not in ("-s", "-o", "-t"):
-                raise SceneError(f"{entry.where(key)} has the option {option!r}, which is not known")
         options[option] = words[:count]
         rest = (rest.split(None, count) + [""] * (count + 1))[count].strip()
     read = READ | {"-bm"} if key in BUMP_MAPS else READ
@@ -476,14 +481,6 @@ def _map(entry: Entry, key: str) -> tuple[dict[str, list[str]], str]:
     for option in options.keys() - read:
         entry.idle_options.add(f"{option} of {entry.lines[key][0]}")
     return options, rest
-
-
-def _is_number(word: str) -> bool:
-    try:
-        float(word)
-    except ValueError:
-        return False
-    return True
 
 
 def alpha_of_entry(entry: Entry) -> float:
@@ -498,4 +495,4 @@ def alpha_of_entry(entry: Entry) -> float:
         entry.read.update(("d", "tr"))
     else:  # only keywords that the material then uses count as read
         entry.read.difference_update(("d", "tr"))
-    return min(max(value, 0.0), 1.0)
+    return value

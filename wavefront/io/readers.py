@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import re
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -107,7 +108,8 @@ def _read_obj(files: SceneFiles, data: bytes, options: LoadOptions) -> Contents:
 def _libraries(files: SceneFiles, libraries: list[str]) -> dict[str, MaterialSpec]:
     """Read the material files; note missing ones."""
     specs: dict[str, MaterialSpec] = {}
-    for library in dict.fromkeys(libraries):
+    names = (name for line in libraries for name in _names(files, line))
+    for library in dict.fromkeys(names):
         try:
             file = files.find(library)
             found = os.path.exists(file)  # also False for invalid names
@@ -122,6 +124,14 @@ def _libraries(files: SceneFiles, libraries: list[str]) -> dict[str, MaterialSpe
         entries = mtl.parse(file, decode_text(files.read(file)), files.losses, files)
         specs.update(mtl.specs(entries, files.losses))
     return specs
+
+
+def _names(files: SceneFiles, line: str) -> list[str]:
+    """Return the material files of a line: one, whose name may contain blanks or be quoted, or several."""
+    line = line.strip('"')
+    beside = os.path.join(os.path.dirname(files.name), line)
+    several = re.findall(r"\S.*?\.mtl(?=\s|$)", line, re.IGNORECASE)
+    return several if len(several) > 1 and not os.path.exists(beside) else [line]
 
 
 def _read_ply(files: SceneFiles, data: bytes, options: LoadOptions) -> Contents:
