@@ -296,8 +296,9 @@ class FirstPoints:
     albedo: Floats | None  # (3, members, t) by which f is multiplied in the end
     ng: Floats | None  # (3, ·) unit geometric normals, if they differ from the shading normals
     guidance: Guidance | None
-    media: Any  # (4, ·) stacks of what the paths that come are inside of, and what crossing does to them,
-    crossing: Any  # (k, ·); None in scenes without a table of media
+    # (4, ·) stacks of what the paths that come are inside of, and what crossing does to them, (k, ·)
+    media: Any = None  # None in scenes without a table of media
+    crossing: Any = None  # likewise
 
     @classmethod
     def of(cls, lit: Shading, albedo: Floats | None, lane_in: Ints, media: Any = None) -> Self | None:
