@@ -107,13 +107,16 @@ def test_scenes_of_scientists_are_short(name):
 @pytest.mark.slow
 def test_furnace_prints_numbers_within_their_errors(run):
     out, picture = run("furnace", "--spp", "16", "--size", "8")
-    rows = re.findall(r"^(\D.*?)\s+([\d.]+)\s+([\d.]+)\s+([\d.]+)\s+([+-][\d.]+)%$", out, re.MULTILINE)
-    assert [float(exact) for _, exact, *_ in rows] == [2, 5, 1, 1, 1]
-    for name, exact, mean, error, off in rows:
+    number, signed = r"\s+([\d.]+)", r"\s+([+-][\d.]+)"
+    rows = re.findall(rf"^(\D.*?){signed}{number}{number}{number}{signed}%$", out, re.MULTILINE)
+    assert [float(exact) for _, _, exact, *_ in rows] == [2, 5, 1, 1, 1]
+    for name, t, exact, mean, error, off in rows:
         difference = float(mean) - float(exact)
         # Student's t with 15 degrees of freedom is beyond 6 with a probability of 2e-5
         assert abs(difference) < 6 * float(error) + 1e-5, name
         assert float(error) < 0.01 * float(exact)
+        if float(error) > 1e-4:
+            assert float(t) == pytest.approx(difference / float(error), abs=0.1)
         assert float(off) == pytest.approx(100 * difference / float(exact), abs=2e-3)
     gray = 0.5 ** (1 / 2.2)
     assert abs(picture.mean() - gray) < 0.01
