@@ -236,7 +236,9 @@ def test_what_nobody_reaches_stays_with_its_path(monkeypatch: pytest.MonkeyPatch
         surface=MagicMock(unmapped=None, folds=None, __len__=lambda _: 2),
     )
     lit.albedo = lambda: np.ones((3, 2), f4)
-    paths = SimpleNamespace(slot=np.array([1, 0]), throughput=rng.uniform(0.2, 1, (3, 2)).astype(f4))
+    paths = SimpleNamespace(
+        media=None, slot=np.array([1, 0]), throughput=rng.uniform(0.2, 1, (3, 2)).astype(f4)
+    )
     points = shared_points(rng, 1, OPEN.center).take(np.array([0, 1]))
     points.slot[:] = 0, 1
     points.throughput = rng.uniform(0.2, 1, (3, 2)).astype(f4)
