@@ -247,7 +247,7 @@ def test_what_nobody_reaches_stays_with_its_path(monkeypatch: pytest.MonkeyPatch
     tiles = WaveTiles.of(np.array([0, 0], np.uint32), np.array([0, 1], np.uint32), PictureTiles(100, 1))
     arrived = rng.uniform(0.2, 1, (3, MEMBERS_OF_TILES, tiles.count)).astype(f4)
 
-    def first_of(lit, albedo, lane_in):
+    def first_of(lit, albedo, lane_in, media):
         return SimpleNamespace(present=lane_in >= 0)
 
     def arriving(scene, first, points, lights, numbers, glossy):
