@@ -384,6 +384,7 @@ MUTATIONS: dict[str, Mutation] = {
     "hdr": mutate_hdr,
     "npy": mutate_npy,
     "npz": mutate_npz,
+    **dict.fromkeys(("tga", "tif", "tiff", "webp", "gif", "ppm", "pfm"), mutate_words),
 }
 
 

@@ -19,10 +19,12 @@ from functools import partial
 from pathlib import Path
 
 import numpy as np
+import OpenEXR
 import pytest
 import trimesh
 from file_damage import mutate
 from gltf_builder import Builder
+from PIL import Image as Pil
 
 from wavefront.codecs.display import Display
 from wavefront.codecs.image_data import ImageData
@@ -105,6 +107,7 @@ def make_seeds(folder):
     build.glb(folder / "m.glb")
     for extension in ("png", "jpg", "exr", "hdr", "npy"):
         write_image(folder / f"t.{extension}", np.random.default_rng(0).random((9, 11, 3)))
+    make_pictures(folder)
     write_image(folder / "t.square.exr", np.random.default_rng(0).random((8, 8, 3)))
     rgb = np.random.default_rng(1).random((9, 11, 3), np.float32)
     arrays = {"alpha": rgb[..., 0], "shape_id": np.arange(99, dtype=np.int32).reshape(9, 11)}
@@ -113,6 +116,24 @@ def make_seeds(folder):
     for extension in ("exr", "npz"):
         write_image(folder / f"p.{extension}", layered)
     write_image(folder / "p.png", layered, Display(), bits=16)
+
+
+def make_pictures(folder):
+    """Write sound pictures of formats that are read and not written."""
+    codes = np.random.default_rng(2).integers(0, 256, (9, 11, 4), np.uint8)
+    color, deep = Pil.fromarray(codes), np.random.default_rng(3).random((9, 11), np.float32)
+    for name in ("t.tga", "t.webp", "t.tiff"):
+        color.save(folder / name)
+    for name in ("t.gif", "t.ppm", "t.palette.tif"):
+        (color.convert("P") if "palette" in name else color.convert("RGB")).save(folder / name)
+    color.convert("CMYK").save(folder / "t.ink.jpg")
+    color.convert("P").save(folder / "t.clear.png", transparency=bytes([0, 9, 200]))
+    Pil.fromarray(deep).save(folder / "t.tif", compression="tiff_lzw")
+    Pil.fromarray((deep * 65535).astype(np.uint16)).save(folder / "t.deep.tif")
+    (folder / "t.pfm").write_bytes(b"Pf 11 9 -1\n" + deep.astype("<f4").tobytes())
+    channels = {f"ViewLayer.{name}": deep for name in ("Combined.R", "Combined.G", "Combined.B", "Depth.Z")}
+    header = {"type": OpenEXR.scanlineimage, "compression": OpenEXR.ZIP_COMPRESSION}
+    OpenEXR.File(header, channels).write(str(folder / "t.layers.exr"))
 
 
 def damage(data, rng):

@@ -132,10 +132,7 @@ def read_image(path: str | os.PathLike[str]) -> Floats:
 def read_codes(path: str | os.PathLike[str], budget: Budget | None = None) -> NDArray[Any]:
     """Return the pixels of an image file as stored, uint8, uint16 or float32, (H, W, C)."""
     budget = budget or Budget()
-    if not Path(path_name(path)).suffix:
-        check_regular(path)  # what it is, its first bytes say
-    else:
-        _find(IMAGE_READERS, path)
+    _check_kind(path)
     data = read_bytes(path)
     budget.add_file(len(data))
     with in_memory(path):
@@ -146,8 +143,8 @@ def read_picture(path: str | os.PathLike[str]) -> ImageData:
     """Return all that an image file holds, as linear values.
 
     png and jpg are decoded by the gamma in the file (gAMA or sRGB of a png, Exif of a jpg), or by the
-    sRGB curve if it has none. The last of two or four channels is alpha. The colors of a png with alpha are
-    multiplied by it; other formats hold them so.
+    sRGB curve if it has none; other codes of 8 and 16 bits by that. The last of two or four channels is
+    alpha. Colors of codes are multiplied by it; formats of floats hold them so.
 
     Raises
     ------
@@ -159,7 +156,7 @@ def read_picture(path: str | os.PathLike[str]) -> ImageData:
 
 
 def _picture(path: str | os.PathLike[str]) -> ImageData:
-    _find(IMAGE_READERS, path)
+    _check_kind(path)
     data, name, extension = read_bytes(path), os.fspath(path), Path(path).suffix.lower()
     whole = ALL_OF_IT.get(extension)
     budget = Budget.of(data)
@@ -212,6 +209,14 @@ def decode_codes(data: bytes, name: str, budget: Budget) -> NDArray[Any]:
         decode = next((other for starts, other in SIGNED if data.startswith(starts)), decode)
     kind = extension[1:] if extension in IMAGE_READERS else "png"
     return _decode(name, decode, data, kind, budget)
+
+
+def _check_kind(path: str | os.PathLike[str]) -> None:
+    """Refuse a file of an unknown extension; of one without, the first bytes say what it is."""
+    if Path(path_name(path)).suffix:
+        _find(IMAGE_READERS, path)
+    else:
+        check_regular(path)
 
 
 def _decode(name: str, decode: Callable[[bytes, Budget], T], data: bytes, kind: str, budget: Budget) -> T:

@@ -510,18 +510,20 @@ class Image(Answers):
 
     @classmethod
     def load(cls, path: str | os.PathLike[str]) -> Image:
-        """Read a picture by its extension, as linear values.
+        """Read a picture as linear values; its first bytes say what it is, or else its extension.
 
         exr and npz files of `save` give the same image again: rgb, layers, errors, names and metadata, bit
         for bit. png and jpg files are decoded by the gamma that they record, as files of `save` do, and by
-        the sRGB curve if they record none. exr, hdr, npy and npz are linear. The last of two or four channels
-        becomes the layer "alpha", and colors of a png are multiplied by it. One channel of color becomes
-        three. A checkpoint gives the picture so far.
+        the sRGB curve if they record none; so are all others of 8 and 16 bits. exr, hdr, pfm, npy, npz and
+        tif of floats are linear. The last of two or four channels becomes the layer "alpha", and colors of 8
+        and 16 bits are multiplied by it. One channel of color becomes three. Of an exr with layers the
+        picture itself is read. A checkpoint gives the picture so far.
 
         Parameters
         ----------
         path
-            A png, jpg, exr, hdr, npy or npz file, or a checkpoint with any extension.
+            A png, jpg, bmp, gif, tga, tif, webp, ppm, pfm, exr, hdr, npy or npz file, or a checkpoint with
+            any extension.
 
         Raises
         ------

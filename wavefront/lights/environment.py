@@ -62,7 +62,7 @@ class Environment(Parametrized, FarLight):
     ----------
     radiance
         W·sr⁻¹·m⁻²: a color (a number, three, or a name such as "white"), which is the same from all
-        directions; or an image, a file (exr, hdr, npy, png, jpg) or an array (H, W, 3), top row first.
+        directions; or an image, a file (exr, hdr, png or another) or an array (H, W, 3), top row first.
         Pictures of 8 and 16 bits are decoded from sRGB and count from 0 to 1; all others are linear. Alpha is
         not used.
     transform
