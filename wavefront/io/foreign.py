@@ -100,8 +100,8 @@ def built(raw: RawMesh, smooth: bool | float | str) -> list[Shape]:
         assign_material(raw, None)
     with Losses(raw.name) as losses:
         mesh = build(raw.name, raw, losses)
-    if mesh is None:
-        raise SceneError(f"{raw.name}: has no faces")
+        if mesh is None:
+            raise losses.nothing("has no faces")
     return [mesh]
 
 

@@ -14,10 +14,12 @@ import numpy as np
 from ..camera import Camera
 from ..core.errors import LimitError, SceneError, exact, printable
 from ..lights import DirectionalLight, PointLight, SpotLight
-from ..shapes.transform import Matrix
+from ..shapes.transform import IDENTITY, Matrix
 from .gltf_document import Document, floats, shown
-from .gltf_meshes import primitives
-from .gltf_nodes import Node, count_placements, placements, walk
+from .gltf_meshes import Primitive, primitives
+from .gltf_nodes import INSTANCING, Node, count_placements, placements, walk
+from .gltf_posing import Skin, held, pose, read_skin, target_weights
+from .losses import Losses
 from .placing import Places
 from .repair import RawMesh
 
@@ -28,7 +30,7 @@ HEIGHT = 512  # pixels of a camera's picture; files give only its aspect ratio
 class GltfContents:
     """The content of a file."""
 
-    raws: list[tuple[RawMesh, int | None]] = field(default_factory=list)  # meshes, numbers of their materials
+    raws: list[tuple[RawMesh, Any]] = field(default_factory=list)  # meshes, numbers of their materials
     places: Places = field(default_factory=Places)  # of the meshes
     lights: list[DirectionalLight | PointLight | SpotLight] = field(default_factory=list)
     camera: Camera | None = None
@@ -47,38 +49,122 @@ def contents(document: Document) -> GltfContents:
     SceneError
         If an element is missing or malformed, or the nodes place more meshes than its limits allow.
     """
-    out = GltfContents()
-    numbers: dict[int, list[int]] = {}  # by mesh of the file: the indices of its parts among `out.raws`
-    of: list[int] = []  # index among `out.raws` of each placed mesh
-    where: list[Matrix] = []
-    names: list[str] = []
-    for node in walk(document):
-        json = node.json
-        if "mesh" in json:
-            with document.inside(f"nodes[{node.index}]"):
-                parts = _parts(document, out, numbers, json["mesh"])
-                document.files.limits.check_meshes(document.name, len(out.raws))
-                count = count_placements(document, node)
-                total = len(of) + count * len(parts)
-                if total > document.files.limits.instances:
-                    raise LimitError(
-                        f"its nodes place {total} meshes so far; the limit is "
-                        f"{document.files.limits.instances} (LoadLimits.instances)"
-                    )
-                of += parts * count
-                names += _names_of_parts(node, len(parts)) * count
-                where.append(placements(document, node, count).repeat(len(parts), 0))
-        if len(json.keys() & {"camera", "skin", "extensions"}):
-            with document.inside(f"nodes[{node.index}]"):
-                _add_others(document, out, node)
-    if len(document.json.get("scenes", [])) > 1:
+    out, nodes = GltfContents(), walk(document)
+    meshes = _Meshes(document, {node.index: node.matrix for node in nodes})
+    for node in nodes:
+        if node.shown and "mesh" in node.json:
+            with document.part(f"nodes[{node.index}]"):
+                meshes.place(node)
+        if node.shown and len(node.json.keys() & {"camera", "extensions"}):
+            _add_others(document, out, node)
+    if len(document.items("scenes")) > 1:
         document.lose("further scenes", "the file")
     if document.json.get("animations"):
-        document.lose("animations", "the file")
-    # the walk meets the last node first, as trimesh does
-    if of:
-        out.places = Places(np.array(of[::-1], np.intp), np.concatenate(where)[::-1], names[::-1])
+        document.files.losses.note("animations", done="left out; what they move is at rest")
+    out.raws, out.places = meshes.raws, meshes.places()
     return out
+
+
+class _Meshes:
+    """The meshes of the nodes, each read once, and where they stand.
+
+    Parameters
+    ----------
+    document
+        The file.
+    matrices
+        (4, 4) to the scene of each node, by its number in the file.
+    """
+
+    def __init__(self, document: Document, matrices: dict[int, Matrix]) -> None:
+        self._document, self._matrices = document, matrices
+        self.raws: list[tuple[RawMesh, Any]] = []  # with the numbers of their materials
+        self._primitives: dict[int, list[Primitive]] = {}
+        self._skins: dict[int, Skin] = {}
+        self._made: dict[Any, list[int]] = {}  # indices among `raws`, by mesh, skin and weights
+        self._skinned: set[int] = set()  # of them
+        self._of: list[int] = []  # index among `raws` of each placed mesh
+        self._where: list[Matrix] = []
+        self._names: list[str] = []
+
+    def place(self, node: Node) -> None:
+        """Place the mesh of a node.
+
+        Raises
+        ------
+        SceneError
+            If the mesh cannot be read, or there are more placements than the limits allow.
+        """
+        document, limits = self._document, self._document.files.limits
+        parts = self._parts(node)
+        limits.check_meshes(document.name, len(self.raws))
+        if not parts:
+            return
+        matrices = self._placements(node, parts)
+        total = len(self._of) + len(matrices) * len(parts)
+        if total > limits.instances:
+            most = f"{limits.instances} (LoadLimits.instances)"
+            raise LimitError(f"its nodes place {total} meshes so far; the limit is {most}")
+        self._of += parts * len(matrices)
+        self._names += _names_of_parts(node, len(parts)) * len(matrices)
+        at = np.repeat(matrices, len(parts), 0).reshape(-1, len(parts), 4, 4)
+        at[:, [part in self._skinned for part in parts]] = IDENTITY
+        self._where.append(at.reshape(-1, 4, 4))
+
+    def places(self) -> Places:
+        """Return the placements; the walk meets the last node first, as trimesh does."""
+        if not self._of:
+            return Places()
+        return Places(np.array(self._of[::-1], np.intp), np.concatenate(self._where)[::-1], self._names[::-1])
+
+    def _placements(self, node: Node, parts: list[int]) -> Matrix:
+        """Return the matrices (n, 4, 4) of the instances of a node."""
+        document = self._document
+        with document.part(f"nodes[{node.index}].{INSTANCING}", "the mesh once in its place"):
+            count = count_placements(document, node)
+            if len(self._of) + count * len(parts) > document.files.limits.instances:
+                return np.broadcast_to(node.matrix, (count, 4, 4))  # which is refused
+            return placements(document, node, count)
+        return node.matrix[None]
+
+    def _parts(self, node: Node) -> list[int]:
+        """Return the indices of a mesh's parts among `raws`; the mesh is read at its first use."""
+        mesh: Any = node.json["mesh"]
+        key = repr(mesh), repr(node.json.get("skin")), repr(node.json.get("weights"))
+        if key not in self._made:
+            if not isinstance(mesh, int) or mesh not in self._primitives:
+                self._primitives[mesh] = primitives(self._document, mesh)
+            first = len(self.raws)
+            self.raws += [(self._posed(node, each), each.material) for each in self._primitives[mesh]]
+            self._made[key] = list(range(first, len(self.raws)))
+            self._skinned |= {
+                first + number
+                for number, each in enumerate(self._primitives[mesh])
+                if each.bend.joints is not None and self._skin(node) is not None
+            }
+        return self._made[key]
+
+    def _posed(self, node: Node, part: Primitive) -> RawMesh:
+        """Return the mesh of a primitive at rest."""
+        document, skin, count = self._document, self._skin(node), len(part.bend.targets)
+        weights = np.zeros(count)
+        if count:
+            with document.part(f"nodes[{node.index}].weights", "0 in their place"):
+                mesh = document.get("meshes", node.json["mesh"])
+                weights = target_weights(mesh, node.json, count)
+        bend = part.bend if skin is None else held(document.files.losses, part.place, part.bend, skin)
+        return pose(part.raw, bend, weights, skin, self._matrices)
+
+    def _skin(self, node: Node) -> Skin | None:
+        """Return the skin of a node, None without one or if it is damaged."""
+        index = node.json.get("skin")
+        if index is None:
+            return None
+        with self._document.part(f"nodes[{node.index}].skin", "the mesh by its node in its place"):
+            if not isinstance(index, int) or index not in self._skins:
+                self._skins[index] = read_skin(self._document, index, self._matrices)
+            return self._skins[index]
+        return None
 
 
 def _names_of_parts(node: Node, parts: int) -> list[str]:
@@ -87,24 +173,15 @@ def _names_of_parts(node: Node, parts: int) -> list[str]:
     return [f"{name}_{part}" if name and parts > 1 else name for part in range(parts)]
 
 
-def _parts(document: Document, out: GltfContents, numbers: dict[int, list[int]], mesh: Any) -> list[int]:
-    """Return the indices of a mesh's parts among `out.raws`; the mesh is read at its first use."""
-    if not isinstance(mesh, int) or mesh not in numbers:
-        found = primitives(document, mesh)
-        numbers[mesh] = list(range(len(out.raws), len(out.raws) + len(found)))
-        out.raws += found
-    return numbers[mesh]
-
-
 def _add_others(document: Document, out: GltfContents, node: Node) -> None:
     """Add the camera and the light of a node."""
-    if "skin" in node.json:
-        document.lose("skin", node.label)
     if "camera" in node.json:
-        _add_camera(document, out, node.json["camera"], node.matrix)
-    light = node.json.get("extensions", {}).get("KHR_lights_punctual", {}).get("light")
-    if light is not None:
-        _add_light(document, out, light, node.matrix)
+        with document.part(f"nodes[{node.index}].camera"):
+            _add_camera(document, out, node.json["camera"], node.matrix)
+    with document.part(f"nodes[{node.index}].extensions"):
+        light = node.json.get("extensions", {}).get("KHR_lights_punctual", {}).get("light")
+        if light is not None:
+            _add_light(document, out, light, node.matrix)
 
 
 def _add_camera(document: Document, out: GltfContents, index: Any, matrix: Matrix) -> None:
@@ -168,39 +245,45 @@ def _add_light(document: Document, out: GltfContents, index: Any, matrix: Matrix
         light = lights[index]
         if "range" in light:
             document.lose("range of a light", f"light {index}")
-        found = punctual_light(light, matrix)
+        found = punctual_light(light, matrix, document.files.losses, f"light {index}")
         if found is None:
             document.lose(f"{light.get('type')} light", f"light {index}")
         else:
             out.lights.append(found)
 
 
-def punctual_light(light: dict[str, Any], matrix: Matrix) -> DirectionalLight | PointLight | SpotLight | None:
+def punctual_light(
+    light: dict[str, Any], matrix: Matrix, losses: Losses, place: str
+) -> DirectionalLight | PointLight | SpotLight | None:
     """Return a light of KHR_lights_punctual by the matrix of its node to the scene; None for other types.
+
+    Numbers that are out of range are clamped, and noted.
 
     Raises
     ------
     SceneError
-        If a value is malformed or out of range.
+        If a value is malformed.
     """
-    color = floats("color", light.get("color", [1, 1, 1]), 3)
+    color = losses.within("color", floats("color", light.get("color", [1, 1, 1]), 3), 0, np.inf, place)
+    intensity = floats("intensity", [light.get("intensity", 1)], 1)[0]
     with np.errstate(over="ignore"):
-        strength = color * floats("intensity", [light.get("intensity", 1)], 1)
-    place, forward = matrix[:3, 3], -matrix[:3, 2]
+        strength = color * losses.within("intensity", intensity, 0, np.inf, place)
+    at, forward = matrix[:3, 3], -matrix[:3, 2]
     match light.get("type"):
         case "point":
-            return PointLight(place, strength)
+            return PointLight(at, strength)
         case "directional":
             return DirectionalLight(forward, strength)
         case "spot":
-            spot = light.get("spot", {})
-            inner, outer = floats(
-                "cone", [spot.get("innerConeAngle", 0), spot.get("outerConeAngle", np.pi / 4)], 2
-            )
-            if not (0 <= inner <= outer <= np.pi / 2 and outer > 0):
-                raise SceneError(
-                    f"cone angles are {inner:g} and {outer:g}; 0 <= inner <= outer <= π/2, outer > 0"
-                )
-            angle, blend = float(np.degrees(2 * outer)), float(1 - inner / outer)
-            return SpotLight(place, strength, direction=forward, angle=angle, blend=blend)
+            angle, blend = _cone(light.get("spot", {}), losses, place)
+            return SpotLight(at, strength, direction=forward, angle=angle, blend=blend)
     return None
+
+
+def _cone(spot: dict[str, Any], losses: Losses, place: str) -> tuple[float, float]:
+    """Return the angle of a spot in degrees, and the part of it over which light falls off."""
+    given = [spot.get("innerConeAngle", 0), spot.get("outerConeAngle", np.pi / 4)]
+    inner, outer = floats("cone", given, 2)
+    outer = float(losses.within("outerConeAngle", outer, np.pi / 2**20, np.pi / 2, place))
+    inner = float(losses.within("innerConeAngle", inner, 0, outer, place))
+    return float(np.degrees(2 * outer)), 1 - inner / outer

@@ -11,6 +11,7 @@ import json
 import struct
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from importlib.util import find_spec
 from itertools import chain
 from typing import Any
 from urllib.parse import unquote
@@ -21,6 +22,8 @@ from numpy.typing import NDArray
 from ..core.errors import LimitError, SceneError, printable
 from ..core.plural import plural
 from ..shapes.transform import Matrix
+from .gltf_compression import MESHOPT, unpacked_view
+from .losses import Losses
 from .sources import MAX_TRIANGLES, SceneFiles
 
 COMPONENTS: dict[int, type[np.generic]] = {
@@ -48,20 +51,46 @@ class Document:
     def __init__(self, files: SceneFiles, data: bytes) -> None:
         self.files = files
         self.name = files.name
-        text, self._binary = _chunks(self.name, data) if data[:4] == b"glTF" else (data, None)
+        text, self._binary = _chunks(files.losses, data) if data[:4] == b"glTF" else (data, None)
         try:
             self.json = json.loads(text)
         except (ValueError, RecursionError) as error:
             raise SceneError(f"{self.name}: not glTF: its JSON is damaged: {error}") from error
         if not isinstance(self.json, dict):
             raise SceneError(f"{self.name}: not glTF: its JSON is a {type(self.json).__name__}")
-        with self.inside("asset"):
-            version = str(self.json.get("asset", {}).get("version", ""))
-        if not version.startswith("2"):
-            raise SceneError(f"{self.name}: is glTF version {shown(version)}; only version 2 is read")
+        self._check_version()
         self._buffers: dict[int, bytes] = {}
         self._files: dict[str, bytes] = {}
+        self._unpacked: dict[int, bytes] = {}  # buffer views
         self._numbers = 0  # numbers that were read from accessors
+
+    def _check_version(self) -> None:
+        asset = self.json.get("asset")
+        version = asset.get("version") if isinstance(asset, dict) else None
+        if version is None:
+            self.files.losses.note("asset.version", value="missing", done="read as version 2.0")
+        elif not str(version).startswith("2"):
+            raise SceneError(f"{self.name}: is glTF version {shown(version)}; only version 2 is read")
+
+    @contextmanager
+    def part(self, element: str, done: str = "left out") -> Iterator[None]:
+        """Note an error of the block, which reads an element, and go on; `done` is what was done instead.
+
+        Raises
+        ------
+        SceneError
+            If a limit is passed.
+        """
+        with self.files.losses.part(element, done), self.inside(element):
+            yield
+
+    def items(self, kind: str) -> list[Any]:
+        """Return the array `kind`; an empty one where it is malformed, which is noted."""
+        found = self.json.get(kind, [])
+        if not isinstance(found, list):
+            self.files.losses.note(kind, value=shown(found), done="left out, as it must be a list")
+            return []
+        return found
 
     @contextmanager
     def inside(self, element: str) -> Iterator[None]:
@@ -136,7 +165,10 @@ class Document:
                 raise SceneError(f"{self.name}: {where} has no data")
             claimed = self.count(where, item, "byteLength")
             if len(data) < claimed:
-                raise SceneError(f"{self.name}: {where} has {plural(len(data), 'byte')}; it claims {claimed}")
+                size = plural(len(data), "byte")
+                self.files.losses.note(
+                    f"has {size}; it claims {claimed}", where, done="what is there is read"
+                )
             self._buffers[index] = data
         return self._buffers[index]
 
@@ -145,6 +177,9 @@ class Document:
         item = self.get("bufferViews", index)
         where = f"bufferViews[{index}]"
         with self.inside(where):
+            extension = next((name for name in MESHOPT if name in item.get("extensions", {})), None)
+            if extension is not None and not self._can_do_without(extension, item.get("buffer")):
+                return self._unpack(index, item["extensions"][extension], extension, where)
             data = self.buffer(item.get("buffer", -1))
         start, length = self.count(where, item, "byteOffset"), self.count(where, item, "byteLength")
         if start + length > len(data):
@@ -153,13 +188,33 @@ class Document:
             )
         return data, start, start + length, self.count(where, item, "byteStride")
 
+    def _can_do_without(self, extension: str, buffer: Any) -> bool:
+        """Return whether a compressed view has its bytes in a buffer, too, and no library unpacks it."""
+        item = self.get("buffers", buffer)
+        plain = "uri" in item or (buffer == 0 and self._binary is not None)
+        if not plain or item.get("extensions", {}).get(extension, {}).get("fallback"):
+            return False
+        return find_spec("meshopt") is None
+
+    def _unpack(
+        self, index: int, packed: dict[str, Any], extension: str, where: str
+    ) -> tuple[bytes, int, int, int]:
+        """Return a compressed buffer view as `view` does."""
+        count, stride = self.count(where, packed, "count"), self.count(where, packed, "byteStride")
+        if index not in self._unpacked:
+            self.files.budget.charge(f"{self.name}: {where}", count * stride)
+            data, start = self.buffer(packed.get("buffer", -1)), self.count(where, packed, "byteOffset")
+            data = data[start : start + self.count(where, packed, "byteLength")]
+            self._unpacked[index] = unpacked_view(data, packed, extension, count, stride)
+        return self._unpacked[index], 0, count * stride, stride
+
     def accessor(self, index: Any) -> NDArray[Any]:
         """Return the elements of an accessor, (count, width); normalized integers become float32."""
         item = self.get("accessors", index)
         where = f"accessors[{index}]"
         with self.inside(where):
             values = self._elements(item, where)
-            return _normalized(values) if item.get("normalized") else values
+            return normalized(values) if item.get("normalized") else values
 
     def _elements(self, item: dict[str, Any], where: str) -> NDArray[Any]:
         kind, width = COMPONENTS.get(item.get("componentType", 0)), WIDTHS.get(item.get("type", ""))
@@ -240,11 +295,12 @@ def table(rows: list[Any], width: int, where: Callable[[int], str]) -> Matrix:
             array = np.full((1, 1), np.inf)
         if np.isfinite(array).all():
             return array
-    row = next(i for i, value in enumerate(rows) if not _is_row(value, width))
+    row = next(i for i, value in enumerate(rows) if not is_row(value, width))
     raise SceneError(f"{where(row)} is {shown(rows[row])}; it must be {plural(width, 'finite number')}")
 
 
-def _is_row(value: Any, width: int) -> bool:
+def is_row(value: Any, width: int) -> bool:
+    """Return whether a value of the JSON is a list of `width` finite numbers."""
     return (
         isinstance(value, list)
         and len(value) == width
@@ -258,30 +314,34 @@ def shown(value: Any) -> str:
     return text if len(text) <= SHOWN else text[: SHOWN - 3] + "..."
 
 
-def _normalized(values: NDArray[Any]) -> NDArray[Any]:
+def normalized(values: NDArray[Any]) -> NDArray[Any]:
+    """Return integers as float32 in [0, 1] or [-1, 1]."""
     if values.dtype.kind == "f":
         return values
     scaled = values.astype(np.float32) / np.float32(np.iinfo(values.dtype).max)
     return np.maximum(scaled, np.float32(-1))
 
 
-def _chunks(name: str, data: bytes) -> tuple[bytes, bytes | None]:
+def _chunks(losses: Losses, data: bytes) -> tuple[bytes, bytes | None]:
     """Split a .glb into its JSON and its binary chunk."""
+    name = losses.name
     if len(data) < 20:
         raise SceneError(f"{name}: ends early: {plural(len(data), 'byte')}")
     version, length = struct.unpack_from("<II", data, 4)
     if version != 2:
         raise SceneError(f"{name}: is glTF version {version}; only version 2 is read")
     if length > len(data):
-        raise SceneError(f"{name}: claims {plural(length, 'byte')}; it has {len(data)}")
+        losses.note(f"claims {plural(length, 'byte')}; it has {len(data)}", done="what is there is read")
     parts: dict[bytes, bytes] = {}
-    at = 12
-    while at + 8 <= length:
+    at, end = 12, min(length, len(data))
+    while at + 8 <= end:
         size, kind = struct.unpack_from("<I4s", data, at)
-        if at + 8 + size > length:
-            raise SceneError(f"{name}: a chunk claims {plural(size, 'byte')}; {length - at - 8} are there")
-        parts.setdefault(kind, data[at + 8 : at + 8 + size])
+        there = min(size, end - at - 8)
+        if there < size:
+            what = f"a chunk claims {plural(size, 'byte')}; {there} are there"
+            losses.note(what, done="what is there is read")
+        parts.setdefault(kind, data[at + 8 : at + 8 + there])
         at += 8 + size
     if b"JSON" not in parts:
-        raise SceneError(f"{name}: has no JSON chunk")
+        raise losses.nothing("has no JSON chunk")
     return parts[b"JSON"], parts.get(b"BIN\0")

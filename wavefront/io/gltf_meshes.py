@@ -1,10 +1,13 @@
 """Meshes of glTF: attributes and lists, strips and fans of triangles.
 
-Source: Khronos Group, glTF 2.0 specification, chapter 3.7.2, and KHR_mesh_quantization.
+Source: Khronos Group, glTF 2.0 specification, chapter 3.7.2, KHR_mesh_quantization and
+KHR_draco_mesh_compression.
 """
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+from importlib.util import find_spec
 from typing import Any
 
 import numpy as np
@@ -12,69 +15,161 @@ from numpy.typing import NDArray
 
 from ..core.errors import SceneError
 from ..core.plural import plural
-from .gltf_document import Document
-from .repair import Faces, RawMesh, Table, wide
+from .gltf_compression import DRACO, DracoMesh
+from .gltf_document import Document, normalized
+from .gltf_posing import MORPHED, Bend
+from .repair import Faces, RawMesh, Table, existing, wide
 
 READ = ("TEXCOORD_0", "TEXCOORD_1", "COLOR_0")  # attributes of a mesh with a number in their name
 TRIANGLES, STRIP, FAN = 4, 5, 6
+INFLUENCES = 4  # joints of a vertex in one attribute
 
 
-def primitives(document: Document, index: Any) -> list[tuple[RawMesh, int | None]]:
-    """Return the parts of a mesh with the numbers of their materials.
+@dataclass
+class Primitive:
+    """A part of a mesh."""
+
+    raw: RawMesh
+    material: Any  # number in the file; None without one
+    bend: Bend
+    place: str  # for messages
+
+
+def primitives(document: Document, index: Any) -> list[Primitive]:
+    """Return the parts of a mesh; those that are damaged are noted.
 
     Raises
     ------
     SceneError
-        If an element is missing or malformed.
+        If the mesh is missing or malformed.
     """
     mesh = document.get("meshes", index)
     with document.inside(f"meshes[{index}]"):
         name = str(mesh.get("name", f"mesh{index}"))
         parts = mesh.get("primitives", [])
-        if "weights" in mesh or any("targets" in part for part in parts):
-            document.lose("morph targets", f"mesh {name!r}")
         out = []
         for number, part in enumerate(parts):
-            mode = part.get("mode", TRIANGLES)
-            if mode not in (TRIANGLES, STRIP, FAN):
-                document.lose("points and lines", f"mesh {name!r}")
-                continue
-            label = name if len(parts) == 1 else f"{name}_{number}"
-            out.append((_primitive(document, part, mode, label), part.get("material")))
+            place = f"meshes[{index}].primitives[{number}]"
+            with document.part(place):
+                mode = part.get("mode", TRIANGLES)
+                if mode not in (TRIANGLES, STRIP, FAN):
+                    document.lose("points and lines", f"mesh {name!r}")
+                    continue
+                label = name if len(parts) == 1 else f"{name}_{number}"
+                out.append(_Reader(document, part, label, place).primitive(mode))
         return out
 
 
-def _primitive(document: Document, part: dict[str, Any], mode: int, name: str) -> RawMesh:
-    where = f"{document.name}: {name!r}"
-    attributes = part.get("attributes", {})
-    if "KHR_draco_mesh_compression" in part.get("extensions", {}) or "POSITION" not in attributes:
-        raise SceneError(f"{where} has no POSITION that can be read")
-    vertices = attribute(document, attributes, "POSITION", 3, where)
-    assert vertices is not None
-    if "indices" in part:
-        indices = document.accessor(part["indices"])[:, 0]
-        if indices.dtype.kind != "u":
-            raise SceneError(f"{where} has indices of type {indices.dtype}; they must be unsigned")
-    else:
-        indices = np.arange(len(vertices))
-    for extra in attributes:
-        if extra.startswith(("COLOR_", "TEXCOORD_")) and extra not in READ:
-            document.lose(extra, f"mesh {name!r}")
+class _Reader:
+    """Reads one primitive."""
 
-    def read(key: str, widths: int | tuple[int, ...]) -> Table | None:
-        values = attribute(document, attributes, key, widths, where, len(vertices))
-        return None if values is None else wide(values)
+    def __init__(self, document: Document, part: dict[str, Any], name: str, place: str) -> None:
+        self._document, self._part, self._name, self._place = document, part, name, place
+        self._where = f"{document.name}: {name!r}"
+        self._attributes = part.get("attributes", {})
+        self._draco = self._unpacked()
+        self._count: int | None = None  # of vertices
 
-    return RawMesh(
-        name,
-        wide(vertices),
-        _triangles(where, indices, mode, len(vertices)),
-        normals=read("NORMAL", 3),
-        uvs=_flip_v(read("TEXCOORD_0", 2)),
-        uvs1=_flip_v(read("TEXCOORD_1", 2)),
-        tangents=read("TANGENT", 4),
-        colors=read("COLOR_0", (3, 4)),
-    )
+    def primitive(self, mode: int) -> Primitive:
+        """Return the primitive.
+
+        Raises
+        ------
+        SceneError
+            If its positions or indices are missing or malformed.
+        """
+        vertices = self._values("POSITION", 3)
+        if vertices is None:
+            raise SceneError(f"{self._where} has no POSITION that can be read")
+        self._count = len(vertices)
+        faces = self._faces(mode)
+        for extra in self._attributes:
+            if extra.startswith(("COLOR_", "TEXCOORD_")) and extra not in READ:
+                self._document.lose(extra, f"mesh {self._name!r}")
+        raw = RawMesh(
+            self._name,
+            wide(vertices),
+            faces,
+            normals=self._read("NORMAL", 3),
+            uvs=_flip_v(self._read("TEXCOORD_0", 2)),
+            uvs1=_flip_v(self._read("TEXCOORD_1", 2)),
+            tangents=self._read("TANGENT", 4),
+            colors=self._read("COLOR_0", (3, 4)),
+        )
+        return Primitive(raw, self._part.get("material"), self._bend(), self._place)
+
+    def _unpacked(self) -> DracoMesh | None:
+        """Return what Draco compressed, None if nothing is, or if the file has it uncompressed, too."""
+        item, document = self._part.get("extensions", {}).get(DRACO), self._document
+        if item is None:
+            return None
+        plain = all("bufferView" in document.get("accessors", each) for each in self._attributes.values())
+        if plain and find_spec("DracoPy") is None:
+            return None
+        data, start, end, _ = document.view(item["bufferView"])
+        return DracoMesh(data[start:end], item, document.files.budget, f"{document.name}: {self._place}")
+
+    def _faces(self, mode: int) -> Faces:
+        """Return the triangles whose vertices exist."""
+        document, where = self._document, self._where
+        if self._draco is not None:
+            indices, mode = self._draco.indices, TRIANGLES
+        elif "indices" in self._part:
+            indices = document.accessor(self._part["indices"])[:, 0]
+            if indices.dtype.kind != "u":
+                raise SceneError(f"{where} has indices of type {indices.dtype}; they must be unsigned")
+        else:
+            indices = np.arange(self._count or 0)
+        beyond = len(indices) % 3 if mode == TRIANGLES else 0
+        if beyond:
+            there = f"has {plural(len(indices), 'index', 'indices')}; triangles need a multiple of 3"
+            document.files.losses.note(there, f"{self._name!r}", done="the last ones are left out")
+        faces = _triangles(where, indices[: len(indices) - beyond], mode, self._count or 0)
+        return faces[existing(document.files.losses, f"{self._name!r}", faces, self._count or 0)]
+
+    def _values(self, key: str, widths: int | tuple[int, ...]) -> NDArray[Any] | None:
+        """Return an attribute of the primitive, None if there is none."""
+        if self._draco is not None and key in self._draco and key in self._attributes:
+            item = self._document.get("accessors", self._attributes[key])
+            values = self._draco.values(key)
+            values = normalized(values) if item.get("normalized") else values
+            return checked(key, values, widths, self._where, self._count)
+        return attribute(self._document, self._attributes, key, widths, self._where, self._count)
+
+    def _read(self, key: str, widths: int | tuple[int, ...]) -> Table | None:
+        """Return an attribute that is left out, which is noted, if it is damaged."""
+        with self._document.part(f"{self._place}.{key}"):
+            values = self._values(key, widths)
+            return None if values is None else wide(values)
+        return None
+
+    def _bend(self) -> Bend:
+        """Return the morph targets and the joints; what is damaged is noted, and without effect."""
+        bend, document = Bend(), self._document
+        with document.part(f"{self._place}.targets"):
+            bend.targets = [self._target(*each) for each in enumerate(self._part.get("targets", []))]
+        with document.part(f"{self._place}.JOINTS"):
+            sets = [each for each in range(len(self._attributes)) if f"JOINTS_{each}" in self._attributes]
+            joints = [self._values(f"JOINTS_{each}", INFLUENCES) for each in sets]
+            weights = [self._values(f"WEIGHTS_{each}", INFLUENCES) for each in sets]
+            if any(each is None for each in weights):
+                raise SceneError("has no WEIGHTS for all of its JOINTS")
+            if sets:
+                bend.joints = np.hstack(joints).astype(np.intp)  # type: ignore[arg-type]
+                bend.weights = wide(np.hstack(weights))  # type: ignore[arg-type]
+        return bend
+
+    def _target(self, number: int, target: dict[str, Any]) -> dict[str, Table]:
+        """Return the differences of a morph target, by attribute."""
+        where, found = f"{self._where}: target {number}", {}
+        for key in target:
+            if key not in MORPHED:
+                self._document.lose(f"{key} of morph targets", f"mesh {self._name!r}")
+                continue
+            values = attribute(self._document, target, key, 3, where, self._count)
+            assert values is not None
+            found[key] = wide(values)
+        return found
 
 
 def _flip_v(coordinates: Table | None) -> Table | None:
@@ -96,9 +191,15 @@ def attribute(
     count: int | None = None,
 ) -> NDArray[Any] | None:
     """Return the elements of a named accessor, None if there is none; check their width and number."""
-    if key not in attributes:
-        return None
-    values = document.accessor(attributes[key])
+    return (
+        checked(key, document.accessor(attributes[key]), widths, where, count) if key in attributes else None
+    )
+
+
+def checked(
+    key: str, values: NDArray[Any], widths: int | tuple[int, ...], where: str, count: int | None
+) -> NDArray[Any]:
+    """Return the values (n, k) of an attribute, or raise a SceneError if they are too few or too narrow."""
     allowed = (widths,) if isinstance(widths, int) else widths
     if values.shape[1] not in allowed:
         listed = " or ".join(map(str, allowed))
@@ -110,12 +211,10 @@ def attribute(
 
 def _triangles(where: str, indices: NDArray[Any], mode: int, count: int) -> Faces:
     """Return faces (m, 3) of a list, strip or fan of triangles over `count` vertices."""
-    there = plural(len(indices), "index", "indices")
     if mode == TRIANGLES:
-        if len(indices) % 3:
-            raise SceneError(f"{where} has {there}; triangles need a multiple of 3")
         return indices.astype(np.intp).reshape(-1, 3)
     if len(indices) < 3:
+        there = plural(len(indices), "index", "indices")
         raise SceneError(f"{where} has {there}; a strip or fan needs at least 3")
     # glTF forbids the largest index; where it occurs, it begins a new strip, as in graphics hardware
     largest = np.iinfo(indices.dtype).max

@@ -12,13 +12,14 @@ import numpy as np
 
 from ..arrays.vec import Ints
 from ..core.errors import SceneError
-from ..shapes.transform import Matrix
-from .gltf_document import Document, shown, table
+from ..shapes.transform import IDENTITY, Matrix
+from .gltf_document import Document, is_row, shown, table
 from .gltf_meshes import attribute
 from .placing import MAX_ELEMENT, in_range
 from .repair import wide
 
 TOO_LARGE = f"has an element whose size is above {MAX_ELEMENT:g}"
+INSTANCING = "EXT_mesh_gpu_instancing"
 INSTANCE_ATTRIBUTES: dict[str, list[float]] = {  # values of an instance without the attribute
     "TRANSLATION": [0, 0, 0],
     "ROTATION": [0, 0, 0, 1],
@@ -33,6 +34,7 @@ class Node:
     index: int  # in the file
     json: dict[str, Any]
     matrix: Matrix  # (4, 4) to the scene
+    shown: bool  # whether the scene has it; others may be joints
 
     @property
     def label(self) -> str:
@@ -41,54 +43,89 @@ class Node:
 
 
 def walk(document: Document) -> list[Node]:
-    """Return every node of the default scene; the last of a node's children comes first.
+    """Return every node of the default scene, and of all where there are skins.
 
-    Raises
-    ------
-    SceneError
-        If a node is missing or malformed, is reached twice, or has a matrix beyond the supported range.
+    The last of a node's children comes first. Nodes that are missing or malformed, that are reached twice, or
+    whose matrices are beyond the supported range are left out, which is noted.
     """
-    stack = [(index, -1, 0) for index in _roots(document)]
-    seen: set[int] = set()
-    indices: list[int] = []
-    found: list[dict[str, Any]] = []
-    parents: list[int] = []  # index of the parent in `found`, -1 for none
-    depths: list[int] = []
-    while stack:
-        index, parent, depth = stack.pop()
-        node = document.get("nodes", index)
-        if index in seen:
-            raise SceneError(f"{document.name}: nodes[{index}] is reached twice; nodes must form a tree")
-        seen.add(index)
-        own = node.get("children")
-        if own is not None:
-            if not isinstance(own, list):
-                raise SceneError(f"{document.name}: nodes[{index}].children is not a list")
-            number = len(indices)
-            stack += [(child, number, depth + 1) for child in own]
-        indices.append(index)
-        found.append(node)
-        parents.append(parent)
-        depths.append(depth)
-    matrices = _to_scene(_local(document, indices, found), np.array(parents, np.intp), np.array(depths))
-    bad = np.flatnonzero(~in_range(matrices))
-    if bad.size:
-        raise SceneError(f"{document.name}: nodes[{indices[bad[0]]}]: its matrix to the scene {TOO_LARGE}")
-    return [Node(*each) for each in zip(indices, found, matrices, strict=True)]
+    way = _Walk(document)
+    way.follow(_roots(document))
+    count = len(way.indices)
+    if document.items("skins"):
+        way.follow([index for index in _tops(document) if index not in way.seen])
+    return way.nodes(count)
+
+
+class _Walk:
+    """The nodes that are met on the way from roots to their children."""
+
+    def __init__(self, document: Document) -> None:
+        self._document = document
+        self.seen: set[int] = set()
+        self.indices: list[int] = []
+        self._found: list[dict[str, Any]] = []
+        self._parents: list[int] = []  # index of the parent in `_found`, -1 for none
+        self._depths: list[int] = []
+
+    def follow(self, roots: list[Any]) -> None:
+        """Add nodes and all below them."""
+        document = self._document
+        stack = [(index, -1, 0) for index in roots]
+        while stack:
+            index, parent, depth = stack.pop()
+            with document.part(f"nodes[{shown(index)}]"):
+                node = document.get("nodes", index)
+                if index in self.seen:
+                    raise SceneError("is reached twice; nodes must form a tree")
+                self.seen.add(index)
+                own = node.get("children", [])
+                if not isinstance(own, list):
+                    document.files.losses.note(f"nodes[{index}].children", value=shown(own), done="left out")
+                    own = []
+                stack += [(child, len(self.indices), depth + 1) for child in own]
+                self.indices.append(index)
+                self._found.append(node)
+                self._parents.append(parent)
+                self._depths.append(depth)
+
+    def nodes(self, count: int) -> list[Node]:
+        """Return the nodes, of which the first `count` are shown."""
+        local = _local(self._document, self.indices, self._found)
+        matrices = _to_scene(local, np.array(self._parents, np.intp), np.array(self._depths, np.intp))
+        kept = in_range(matrices)
+        for at in np.flatnonzero(~kept).tolist():
+            place = f"nodes[{self.indices[at]}]"
+            self._document.files.losses.note(f"its matrix to the scene {TOO_LARGE}", place, done="left out")
+        return [
+            Node(self.indices[at], self._found[at], matrices[at], shown=at < count)
+            for at in np.flatnonzero(kept).tolist()
+        ]
 
 
 def _roots(document: Document) -> list[Any]:
-    """Return the indices of the root nodes of the default scene."""
-    if "scenes" in document.json:
-        index = document.json.get("scene", 0)
-        roots = document.get("scenes", index).get("nodes", [])
-        if not isinstance(roots, list):
-            raise SceneError(f"{document.name}: scenes[{index}].nodes is {shown(roots)}; it must be a list")
-        return roots
-    with document.inside("nodes"):
-        nodes = document.json.get("nodes", [])
-        children = {child for node in nodes for child in node.get("children", [])}
-        return [i for i in range(len(nodes)) if i not in children]
+    """Return the indices of the root nodes of the default scene, or of another where it is damaged."""
+    scenes, index = document.items("scenes"), document.json.get("scene", 0)
+    if scenes or "scene" in document.json:
+        with document.part(f"scenes[{shown(index)}]", "another in its place"):
+            return _nodes_of(document, index)
+        with document.part("scenes[0]", "all nodes in its place"):
+            return _nodes_of(document, 0)
+    return _tops(document)
+
+
+def _nodes_of(document: Document, index: Any) -> list[Any]:
+    roots = document.get("scenes", index).get("nodes", [])
+    if not isinstance(roots, list):
+        raise SceneError(f"nodes is {shown(roots)}; it must be a list")
+    return roots
+
+
+def _tops(document: Document) -> list[Any]:
+    """Return the indices of the nodes that are no children."""
+    nodes = document.items("nodes")
+    held = [node.get("children") for node in nodes if isinstance(node, dict)]
+    children = {child for own in held if isinstance(own, list) for child in own if isinstance(child, int)}
+    return [index for index in range(len(nodes)) if index not in children]
 
 
 def _to_scene(local: Matrix, parents: Ints, depths: Ints) -> Matrix:
@@ -106,18 +143,26 @@ def _to_scene(local: Matrix, parents: Ints, depths: Ints) -> Matrix:
 def _local(document: Document, indices: list[int], nodes: list[dict[str, Any]]) -> Matrix:
     """Return the local matrices (n, 4, 4) of nodes: as given, or translation · rotation · scale."""
 
-    def rows(key: str, default: list[float] | None, width: int, at: Ints) -> Matrix:
+    def rows(key: str, default: list[float], width: int, at: Ints) -> Matrix:
         values = [nodes[i].get(key, default) for i in at.tolist()]
-        return table(values, width, lambda row: f"{document.name}: nodes[{indices[at[row]]}].{key}")
+        try:
+            return table(values, width, lambda row: key)
+        except SceneError:
+            for row, value in enumerate(values):
+                if not is_row(value, width):
+                    where = f"nodes[{indices[at[row]]}]"
+                    document.files.losses.note(key, where, shown(value), f"{default} in its place")
+                    values[row] = default
+            return table(values, width, lambda row: key)
 
     out = np.empty((len(nodes), 4, 4))
     given = np.array(["matrix" in node for node in nodes], np.bool_)
     at = np.flatnonzero(given)
-    out[at] = rows("matrix", None, 16, at).reshape(-1, 4, 4).transpose(0, 2, 1)
-    bad = at[(out[at, 3] != (0, 0, 0, 1)).any(1)]
-    if bad.size:
-        where = f"{document.name}: nodes[{indices[bad[0]]}].matrix"
-        raise SceneError(f"{where} has the last row {out[bad[0], 3].tolist()}; it must be [0, 0, 0, 1]")
+    out[at] = rows("matrix", IDENTITY.ravel().tolist(), 16, at).reshape(-1, 4, 4).transpose(0, 2, 1)
+    for i in at[(out[at, 3] != IDENTITY[3]).any(1)].tolist():
+        last = f"the last row of nodes[{indices[i]}].matrix"
+        document.files.losses.note(last, value=str(out[i, 3].tolist()), done="[0, 0, 0, 1] in its place")
+        out[i, 3] = IDENTITY[3]
     at = np.flatnonzero(~given)
     parts = (rows(name.lower(), neutral, len(neutral), at) for name, neutral in INSTANCE_ATTRIBUTES.items())
     out[at] = _composed(*parts)
@@ -165,12 +210,12 @@ def placements(document: Document, node: Node, count: int) -> Matrix:
 
 def _instancing(node: Node) -> dict[str, Any]:
     """Return the attributes of EXT_mesh_gpu_instancing; none if the node does not have it."""
-    extension = node.json.get("extensions", {}).get("EXT_mesh_gpu_instancing", {})
+    extension = node.json.get("extensions", {}).get(INSTANCING, {})
     return extension.get("attributes") or {}
 
 
 def _place(document: Document, node: Node) -> str:
-    return f"{document.name}: EXT_mesh_gpu_instancing of {node.label}"
+    return f"{document.name}: {INSTANCING} of {node.label}"
 
 
 def _composed(translation: Matrix, rotation: Matrix, scale: Matrix) -> Matrix:

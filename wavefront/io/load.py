@@ -235,7 +235,7 @@ def from_trimesh(geometry: Any, *, smooth: bool | float | str = AUTO) -> Scene:
         contents = trimesh_objects.read(geometry, source, losses)
         contents.smooth(check_smooth("smooth", smooth))
         shapes = _some(losses, place_shapes(source, contents.raws, contents.places, losses))
-        scene = Scene(shapes, trimesh_view.lights(geometry), up=contents.up)
+        scene = Scene(shapes, trimesh_view.lights(geometry, losses), up=contents.up)
         trimesh_view.add_camera(scene, geometry)
         scene.losses = losses.found
         return scene

@@ -77,7 +77,7 @@ class Losses:
             if passed_limit(error):
                 raise
             what = str(error).removeprefix(f"{self.name}: ")
-            self.note(what.removeprefix(f"{place}: "), place, done=done)
+            self.note(what.removeprefix(f"{place}: ").removeprefix(f"{place} "), place, done=done)
 
     def within(
         self, part: str, value: ArrayLike, low: float = 0.0, high: float = 1.0, place: str = ""

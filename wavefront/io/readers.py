@@ -76,8 +76,7 @@ def _read_gltf(files: SceneFiles, data: bytes, options: LoadOptions) -> Contents
         found = gltf.contents(document)
         specs = GltfMaterials(document)
         for raw, number in found.raws:
-            # without a material, the mesh gets the default material, as in memory
-            if options.materials and not assign_material(raw, None if number is None else specs.spec(number)):
+            if options.materials and not assign_material(raw, specs.spec(number)):
                 document.lose("vertex colors", f"mesh {raw.name!r}")
     raws = [raw for raw, _ in found.raws]
     return Contents(raws, found.places, found.lights, found.camera, flat=True)

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..arrays.vec import FLOAT32_MAX, Bools, Doubles, Ints, cross, spans
-from ..core.errors import SceneError, printable
+from ..core.errors import printable
 from ..core.plural import plural
 from ..materials import Material
 from ..shapes import Mesh
@@ -50,26 +50,26 @@ class RawMesh:
     attributes: dict[str, Table] = field(default_factory=dict)  # (n or m, k) of scenes of Mitsuba, by name
 
 
-def with_face_colors(source: str, raw: RawMesh, colors: Table) -> RawMesh:
-    """Return the same mesh with colors (m, 4) of its faces: every corner becomes a separate vertex.
-
-    Raises
-    ------
-    SceneError
-        If an index is out of range; `source` is for messages, as for `build`.
-    """
-    apart = with_corners_apart(source, raw)
+def with_face_colors(raw: RawMesh, colors: Table) -> RawMesh:
+    """Return the same mesh with colors (m, 4) of its faces: every corner becomes a separate vertex."""
+    apart = with_corners_apart(raw)
     apart.colors = np.repeat(colors, 3, 0)
     return apart
 
 
-def with_corners_apart(source: str, raw: RawMesh) -> RawMesh:
-    """Return the same mesh with a separate vertex for every corner; arguments and errors as before."""
-    _check_indices(_label(source, raw), raw.faces, len(raw.vertices))
+def with_corners_apart(raw: RawMesh) -> RawMesh:
+    """Return the same mesh with a separate vertex for every corner.
+
+    Where there is no such vertex it is NaN, and `build` leaves the face out.
+    """
     corners = raw.faces.ravel()
+    there = (corners >= 0) & (corners < len(raw.vertices))
+    if not there.all():
+        raw = replace(raw, vertices=np.vstack([raw.vertices, np.full(3, np.nan)]))
+        corners = np.where(there, corners, len(raw.vertices) - 1)
 
     def of_corners(values: Table | None) -> Table | None:
-        return None if values is None else values[corners]
+        return values[np.minimum(corners, len(values) - 1)] if values is not None and len(values) else None
 
     return replace(
         raw,
@@ -93,19 +93,18 @@ def build(source: str, raw: RawMesh, losses: Losses) -> Mesh | None:
     losses
         Where repairs are noted.
 
-    Raises
-    ------
-    SceneError
-        If an index is out of range.
     """
     label = _label(source, raw)
     vertices = np.asarray(raw.vertices, np.float64).reshape(-1, 3)
     faces = np.asarray(raw.faces).reshape(-1, 3).astype(np.intp)
-    _check_indices(label, faces, len(vertices))
+    there = existing(losses, label, faces, len(vertices))
+    if not there.any():
+        return None
+    faces = np.where(there[:, None], faces, 0)
     sound = np.all(np.abs(vertices) <= FLOAT32_MAX, axis=1)  # false for NaN
     vertices = np.where(sound[:, None], vertices, 0.0)
-    keep: Bools = np.all(sound[faces], axis=1)
-    _note_faces(losses, label, raw, ~keep, "with a vertex that is not finite or beyond float32")
+    keep: Bools = there & np.all(sound[faces], axis=1)
+    _note_faces(losses, label, raw, there & ~keep, "with a vertex that is not finite or beyond float32")
     flat = keep & ~_has_area(vertices, faces)
     _note_faces(losses, label, raw, flat, "of zero area")
     faces = faces[keep & ~flat]
@@ -131,11 +130,16 @@ def _label(source: str, raw: RawMesh) -> str:
     return f"{source}: {raw.name!r}" if raw.name else source
 
 
-def _check_indices(label: str, faces: Faces, count: int) -> None:
-    bad = np.argwhere((faces < 0) | (faces >= count))
+def existing(losses: Losses, label: str, faces: Faces, count: int) -> Bools:
+    """Return a mask of the faces all of whose vertices are among `count`; the others are noted."""
+    beyond = (faces < 0) | (faces >= count)
+    bad = np.argwhere(beyond)
     if len(bad):
         i, j = bad[0]
-        raise SceneError(f"{label}: face {i} uses vertex {faces[i, j]}; it must be in [0, {count - 1}]")
+        first = f"face {i} uses vertex {faces[i, j]}; it must be in [0, {count - 1}]"
+        found = plural(int(beyond.any(1).sum()), "face")
+        losses.note(f"{found} with a vertex that does not exist, first: {first}", label, done="left out")
+    return np.asarray(~beyond.any(1))
 
 
 def _note_faces(losses: Losses, label: str, raw: RawMesh, bad: Bools, what: str) -> None:

@@ -13,6 +13,7 @@ from ..lights import DirectionalLight, PointLight, SpotLight
 from ..scene import Scene
 from ..shapes.transform import Matrix
 from . import gltf
+from .losses import Losses
 
 SOURCE = "trimesh object"
 KINDS = {"PointLight": "point", "DirectionalLight": "directional", "SpotLight": "spot"}
@@ -64,7 +65,7 @@ def _pixel_aspect(camera: Any) -> float:
     return float(camera.focal[1] / camera.focal[0])
 
 
-def lights(geometry: Any) -> list[DirectionalLight | PointLight | SpotLight]:
+def lights(geometry: Any, losses: Losses) -> list[DirectionalLight | PointLight | SpotLight]:
     """Return the lights that were set in a trimesh scene.
 
     They have the meaning of KHR_lights_punctual and shine along -z of their nodes. Lights that trimesh added
@@ -80,10 +81,10 @@ def lights(geometry: Any) -> list[DirectionalLight | PointLight | SpotLight]:
     if given and all(_is_made_up(light) for light in given):
         warn_caller(f"{SOURCE}: not honored: the lights that trimesh made for its viewer")
         return []
-    return [_light(geometry, light) for light in given]
+    return [_light(geometry, light, losses) for light in given]
 
 
-def _light(geometry: Any, light: Any) -> DirectionalLight | PointLight | SpotLight:
+def _light(geometry: Any, light: Any, losses: Losses) -> DirectionalLight | PointLight | SpotLight:
     label = f"{SOURCE}: light {getattr(light, 'name', light)!r}"
     kind = KINDS.get(type(light).__name__)
     if kind is None:
@@ -100,7 +101,7 @@ def _light(geometry: Any, light: Any) -> DirectionalLight | PointLight | SpotLig
         outer = min(light.outerConeAngle, np.pi / 2)
         json["spot"] = {"innerConeAngle": min(light.innerConeAngle, outer), "outerConeAngle": outer}
     try:
-        found = gltf.punctual_light(json, matrix)
+        found = gltf.punctual_light(json, matrix, losses, label)
     except SceneError as error:
         raise SceneError(f"{label}: {error}") from error
     assert found is not None

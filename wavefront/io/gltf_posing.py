@@ -1,0 +1,163 @@
+"""Skins and morph targets of glTF: the mesh of a primitive in a pose.
+
+Source: Khronos Group, glTF 2.0 specification, chapters 3.7.2.2 (morph targets) and 3.7.3 (skins).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+import numpy as np
+
+from ..arrays.vec import Doubles, Ints
+from ..core.plural import plural
+from ..shapes.transform import Matrix
+from .gltf_document import Document, floats
+from .losses import Losses
+from .placing import MAX_ELEMENT
+from .repair import RawMesh, Table
+
+MORPHED = {"POSITION": "vertices", "NORMAL": "normals", "TANGENT": "tangents"}  # attributes with targets
+
+
+@dataclass
+class Bend:
+    """How the vertices of a primitive move."""
+
+    targets: list[dict[str, Table]] = field(default_factory=list)  # (n, 3) differences by attribute
+    joints: Ints | None = None  # (n, k) number among the joints of a skin
+    weights: Doubles | None = None  # (n, k) of these joints
+
+
+@dataclass
+class Skin:
+    """The joints of a skin."""
+
+    nodes: list[int]  # in the file, one for each joint
+    inverse: Matrix  # (j, 4, 4) from the mesh to each joint, where the mesh is bound
+
+
+def pose(
+    raw: RawMesh, bend: Bend, weights: Doubles, skin: Skin | None, matrices: Mapping[int, Matrix]
+) -> RawMesh:
+    """Return a mesh in a pose, which the matrices of the nodes and the weights of its targets give.
+
+    Parameters
+    ----------
+    raw
+        The mesh as it is stored.
+    bend
+        How its vertices move.
+    weights
+        Of its morph targets, (t,).
+    skin
+        Its joints; the mesh is then in the space of the scene, whatever the matrix of its own node.
+    matrices
+        (4, 4) to the scene of each node that is a joint, by its number in the file.
+    """
+    raw = _morphed(raw, bend.targets, weights)
+    if skin is None or bend.joints is None or bend.weights is None:
+        return raw
+    joints = np.array([matrices[node] for node in skin.nodes]).reshape(-1, 4, 4) @ skin.inverse
+    return _skinned(raw, bend.joints, bend.weights, joints)
+
+
+def held(losses: Losses, place: str, bend: Bend, skin: Skin) -> Bend:
+    """Return how vertices move whose joints are all of a skin and whose weights add up to one, or to zero.
+
+    What is not so in the file is noted, with its place.
+    """
+    if bend.joints is None or bend.weights is None:
+        return bend
+    there = (bend.joints >= 0) & (bend.joints < len(skin.nodes))
+    absent = bend.joints[~there & (bend.weights != 0)]
+    if len(absent):
+        of = f"joint {absent[0]} of the {len(skin.nodes)} of its skin"
+        losses.note(of, place, "missing", "without effect")
+    weights = np.where(there & np.isfinite(bend.weights), bend.weights, 0)
+    total = weights.sum(1, keepdims=True)
+    loose = int((total <= 0).sum())
+    if loose:
+        losses.note(f"{plural(loose, 'vertex', 'vertices')} without joints", place, done="left in place")
+    weights = np.where(total > 0, weights / np.where(total > 0, total, 1), 0)
+    return Bend(bend.targets, np.where(there, bend.joints, 0), weights)
+
+
+def _morphed(raw: RawMesh, targets: list[dict[str, Table]], weights: Doubles) -> RawMesh:
+    changed: dict[str, Any] = {}
+    for target, weight in zip(targets, weights.tolist(), strict=True):
+        for attribute, difference in target.items() if weight else ():
+            name = MORPHED[attribute]
+            there = changed.get(name, getattr(raw, name))
+            if there is not None:
+                changed[name] = there.copy()
+                changed[name][:, :3] += weight * difference
+    return replace(raw, **changed)
+
+
+def _skinned(raw: RawMesh, joints: Ints, weights: Doubles, matrices: Matrix) -> RawMesh:
+    """Return a mesh moved by the weighted mean of the matrices (j, 4, 4) of its joints."""
+    mean = np.zeros((len(joints), 3, 4))
+    for number, weight in zip(joints.T, weights.T, strict=True):
+        mean += weight[:, None, None] * matrices[number, :3]
+    mean[~weights.any(1)] = np.eye(4)[:3]  # without joints
+    linear, shift = mean[:, :, :3], mean[:, :, 3]
+    cofactors = _cofactors(linear)
+    side = np.where((linear[:, 0] * cofactors[:, 0]).sum(1) < 0, -1.0, 1.0)  # -1 where it mirrors
+    faces = np.where(side[raw.faces].sum(1, keepdims=True) < 0, raw.faces[:, [0, 2, 1]], raw.faces)
+    normals, tangents = raw.normals, raw.tangents
+    if normals is not None:
+        normals = side[:, None] * _turned(cofactors, normals)
+    if tangents is not None:
+        tangents = np.column_stack([_turned(linear, tangents[:, :3]), side * tangents[:, 3]])
+    return replace(
+        raw, vertices=_turned(linear, raw.vertices) + shift, faces=faces, normals=normals, tangents=tangents
+    )
+
+
+def _turned(matrices: Matrix, vectors: Table) -> Table:
+    """Return vectors (n, 3), each multiplied by its matrix (n, 3, 3)."""
+    x, y, z = vectors.T[:, :, None]
+    return matrices[:, :, 0] * x + matrices[:, :, 1] * y + matrices[:, :, 2] * z
+
+
+def _cofactors(matrices: Matrix) -> Matrix:
+    """Return matrices (n, 3, 3) that turn normals: the inverse transpose times the determinant."""
+    first, second, third = matrices.transpose(1, 0, 2)
+    return np.stack([np.cross(second, third), np.cross(third, first), np.cross(first, second)], 1)
+
+
+def read_skin(document: Document, index: Any, nodes: Mapping[int, Matrix]) -> Skin:
+    """Return a skin whose joints are all among `nodes`.
+
+    Raises
+    ------
+    SceneError
+        If it is malformed, or a joint is no node.
+    """
+    item = document.get("skins", index)
+    with document.inside(f"skins[{index}]"):
+        joints = item["joints"]
+        for joint in joints:
+            if type(joint) is not int or joint not in nodes:
+                document.get("nodes", joint)
+                raise ValueError(f"joint nodes[{joint}] is left out")
+        if not joints:
+            raise ValueError("it has no joints")
+        inverse = np.tile(np.eye(4), (len(joints), 1, 1))
+        if "inverseBindMatrices" in item:
+            values = document.accessor(item["inverseBindMatrices"])
+            if values.shape[1] != 16 or len(values) < len(joints):
+                raise ValueError(f"it has {len(values)} inverseBindMatrices for {len(joints)} joints")
+            inverse = values[: len(joints)].astype(np.float64).reshape(-1, 4, 4).transpose(0, 2, 1)
+            if not (np.abs(inverse) <= MAX_ELEMENT).all():
+                raise ValueError("inverseBindMatrices have elements that are not finite or too large")
+        return Skin(joints, inverse)
+
+
+def target_weights(mesh: dict[str, Any], node: dict[str, Any], count: int) -> Doubles:
+    """Return the weights (count,) of the morph targets of a mesh at rest: those of its node, or its own."""
+    given = node.get("weights", mesh.get("weights"))
+    return np.zeros(count) if given is None else floats("weights", given, count)
