@@ -151,9 +151,9 @@ def test_wrong_values(share, tmp_path):
                 except Exception as error:
                     raise AssertionError(f"{at} = {value!r}: {error!r}") from error
     assert loaded > 0
-    assert len(refused) > loaded / 10
+    assert len(refused) > loaded / 50
     for at, value, message in refused:
         rest = message.removeprefix(f"{path}: ")
         assert rest != message, f"{at} = {value!r}: {message}"
         assert "the file is malformed" not in rest, f"{at} = {value!r}: {message}"
-        assert len(rest) < 300
+        assert max(map(len, rest.split("\n"))) < 300

@@ -53,7 +53,9 @@ def glb():
     box.visual = TextureVisuals(material=green)
     scene.add_geometry(urn, geom_name="urn", transform=placed(-1, 0))
     scene.add_geometry(box, geom_name="box", transform=placed(0, 0.25, 0.5, 0.5, -0.5))
-    scene.add_geometry(ball(2), geom_name="ball", transform=placed(1, 0))
+    clay = ball(2)
+    clay.visual = TextureVisuals(material=PBRMaterial(metallicFactor=0.0, roughnessFactor=1.0))
+    scene.add_geometry(clay, geom_name="ball", transform=placed(1, 0))
     scene.graph.update("again", "world", matrix=placed(0, -1), geometry="ball")
     return scene
 

@@ -222,14 +222,18 @@ def test_what_instances_have_besides_is_named(build, path):
             {"TRANSLATION": np.float32([[0, 0, 0], [0, np.nan, 0]])},
             r"has TRANSLATION\[1\] \[0\.0, nan, 0\.0\]; it must be finite",
         ),
-        (
-            {"TRANSLATION": np.zeros((2**20 + 1, 3), np.int8)},
-            r"a\.gltf: nodes\[0\]: its nodes place 1048577 meshes so far; the limit is 1048576",
-        ),
     ],
 )
 def test_bad_instances_are_named(build, path, attributes, message):
+    """The mesh stands once at its node."""
     instanced(build, **attributes).gltf(path)
+    with pytest.warns(UserWarning, match=message + ".*; the mesh once in its place"):
+        assert len(load(path).shapes) == 1
+
+
+def test_the_number_of_instances_is_limited(build, path):
+    instanced(build, TRANSLATION=np.zeros((2**20 + 1, 3), np.int8)).gltf(path)
+    message = r"a\.gltf: nodes\[0\]: its nodes place 1048577 meshes so far; the limit is 1048576"
     with pytest.raises(SceneError, match=message):
         load(path)
 
@@ -387,22 +391,6 @@ def test_the_camera_of_a_file_that_trimesh_read_is_named(build, path):
     held = trimesh.load_scene(build.mesh().gltf(path))
     with pytest.warns(UserWarning, match="trimesh object: not honored: the camera of its glTF file"):
         assert from_trimesh(held).camera is None
-
-
-@pytest.mark.parametrize(
-    ("camera", "message"),
-    [
-        ({"type": "perspective"}, r"a\.gltf: cameras\[0\]: yfov is \[None\]"),
-        ({"type": "perspective", "perspective": {"yfov": -1}}, r"cameras\[0\]: yfov is -1"),
-        ({"type": "perspective", "perspective": {"yfov": 4}}, r"a\.gltf: cameras\[0\]: .*fov is 229"),
-        ({"type": "fisheye"}, r"cameras\[0\]: type is 'fisheye'; it must be 'perspective' or 'orthographic'"),
-    ],
-)
-def test_defects_of_cameras(build, path, camera, message):
-    build.json["nodes"][0]["camera"] = 0
-    build.json["cameras"] = [camera]
-    with pytest.raises(SceneError, match=message):
-        load(build.mesh().gltf(path))
 
 
 def test_point_light(build, path):
@@ -588,8 +576,9 @@ def test_tangents(build, path):
 
 def test_bad_tangents(build, path):
     tangent_space(build, TANGENT=np.zeros((3, 3), np.float32)).gltf(path)
-    with pytest.raises(SceneError, match="has TANGENT with 3 components; it must have 4"):
-        load(path)
+    with pytest.warns(UserWarning, match="has TANGENT with 3 components; it must have 4; left out"):
+        (mesh,) = load_meshes(path)
+    assert mesh.tangents is None
     again = Builder()
     tangent_space(again, TANGENT=np.float32([[1, 0, 0, 1], [np.nan, 0, 0, 1], [1, 0, 0, 1]])).gltf(path)
     with pytest.warns(UserWarning, match="1 tangent is not finite, first: vertex 1"):
@@ -616,8 +605,9 @@ def test_the_handedness_of_tangents_is_seen_in_the_picture(build, path, hand):
 def test_bad_normal_maps(build, path):
     info = build.image(np.zeros((1, 1), np.uint8)) | {"scale": "big"}
     for message in (r"normalTexture\.scale is \['big'\]", r"normalTexture: NormalMap: .* gives numbers"):
-        with pytest.raises(SceneError, match=rf"materials\[0\]\.{message}"):
-            load(build.material(normalTexture=info).gltf(path))
+        with pytest.warns(UserWarning, match=rf"materials\[0\]\.{message}.*; left out"):
+            mesh = load(build.material(normalTexture=info).gltf(path)).shapes[0]
+        assert mesh.material.normal_map is None
         info["scale"] = 1
 
 
@@ -966,10 +956,6 @@ def test_directional_lights(build, path):
 # ---- what is not honored is named once ---------------------------------------------------------
 
 
-def lose_animation(b):
-    b.json["animations"] = [{}]
-
-
 def punctual(b, **light):
     """Put one light of KHR_lights_punctual on the first node."""
     b.json["nodes"][0]["extensions"] = {"KHR_lights_punctual": {"light": 0}}
@@ -991,10 +977,6 @@ def lose_colors(b):
     b.json["meshes"][0]["primitives"][0]["attributes"]["COLOR_1"] = colors
 
 
-def lose_targets(b):
-    b.json["meshes"][0]["primitives"][0]["targets"] = [{}]
-
-
 def lose_lines(b):
     b.json["meshes"][0]["primitives"].append({"mode": 1, "attributes": {"POSITION": 0}})
 
@@ -1005,10 +987,6 @@ def lose_scene(b):
 
 def lose_extension(b):
     b.json["extensionsUsed"] = ["KHR_materials_unknown"]
-
-
-def lose_skin(b):
-    b.json["nodes"][0] |= {"skin": 0, "name": "arm"}
 
 
 def lose_range(b):
@@ -1031,13 +1009,10 @@ def lose_of_material(named, **material):
 @pytest.mark.parametrize(
     ("lose", "message"),
     [
-        (lose_animation, r"the file: animations"),
         (lose_light, r"light 0: area light"),
         (lose_camera, r"cameras\[0\]: further cameras"),
         (lose_colors, r"mesh 'mesh0': COLOR_1"),
-        (lose_targets, r"mesh 'mesh0': morph targets"),
         (lose_lines, r"mesh 'mesh0': points and lines"),
-        (lose_skin, r"node 'arm': skin"),
         (lose_range, r"light 0: range of a light"),
         lose_of_material("occlusionTexture", occlusionTexture="image"),
         lose_of_material("ior 0", extensions={"KHR_materials_ior": {"ior": 0}}),
@@ -1194,117 +1169,6 @@ def test_a_third_set_of_texture_coordinates_is_named(build, path, extra):
 # ---- defects --------------------------------------------------------------------------------------
 
 
-def part(indices=None, colors=None, mode=4):
-    """Give the mesh of a good file other indices or colors."""
-
-    def change(b):
-        (primitive,) = b.json["meshes"][0]["primitives"]
-        primitive["mode"] = mode
-        if indices is not None:
-            primitive["indices"] = b.accessor(np.array(indices, np.uint16))
-        if colors is not None:
-            primitive["attributes"]["COLOR_0"] = b.accessor(colors)
-
-    return change
-
-
-def broken(**changes):
-    """Change the JSON of a good file at dotted places."""
-
-    def change(b):
-        for place, value in changes.items():
-            *parents, last = place.split("__")
-            at = b.json
-            for key in parents:
-                at = at[int(key) if key.isdigit() else key]
-            at[int(last) if last.isdigit() else last] = value
-
-    return change
-
-
-@pytest.mark.parametrize(
-    ("change", "message"),
-    [
-        (broken(asset__version="1.0"), r"a\.gltf: is glTF version '1\.0'; only version 2 is read"),
-        (broken(scene=3), r"scenes\[3\] does not exist; there are 1"),
-        (broken(scenes__0__nodes=[7]), r"nodes\[7\] does not exist"),
-        (broken(nodes__0__mesh=-1), r"meshes\[-1\] does not exist"),
-        (broken(nodes__0__mesh="x"), r"meshes\['x'\] does not exist"),
-        (broken(nodes__0__children=[0]), r"nodes\[0\] is reached twice; nodes must form a tree"),
-        (broken(nodes__0__scale=[1, 2]), r"nodes\[0\]\.scale is \[1, 2\]; it must be 3 finite numbers"),
-        (broken(nodes__0__translation=[1, 2, float("nan")]), r"nodes\[0\]\.translation"),
-        (
-            broken(nodes__0__matrix=[0] * 16),
-            r"a\.gltf: nodes\[0\]\.matrix has the last row \[0\.0, 0\.0, 0\.0, 0\.0\]",
-        ),
-        (
-            broken(nodes__0__scale=[1, 1e101, 1]),
-            r"nodes\[0\]: its matrix to the scene has an element .* above 1e\+100",
-        ),
-        (broken(nodes=5), r"a\.gltf"),
-        (broken(nodes__0=None), r"nodes\[0\] is not an object"),
-        (broken(accessors__0__count=4), r"accessors\[0\] has 4 elements, which its buffer view cannot hold"),
-        (broken(accessors__0__count=10**15), r"accessors\[0\] has 1000000000000000 elements; the limit is"),
-        (broken(accessors__0__count=-3), r"a\.gltf: accessors\[0\]\.count is -3"),
-        (broken(accessors__0__type="VEC2"), r"has POSITION with 2 components; it must have 3"),
-        (broken(accessors__0__type="VEC9"), r"accessors\[0\] is 'VEC9' of 5126, which glTF does not have"),
-        (broken(accessors__0__componentType=9), r"accessors\[0\] is 'VEC3' of 9"),
-        (broken(accessors__1__componentType=5126, accessors__1__count=1), r"indices of type float32"),
-        (broken(bufferViews__0__byteLength=10**9), r"bufferViews\[0\] ends at byte 1000000000"),
-        (broken(bufferViews__0__buffer=2), r"buffers\[2\] does not exist"),
-        (broken(meshes__0__primitives__0__material=0), r"materials\[0\] does not exist"),
-        (broken(meshes__0__primitives__0__attributes={}), r"'mesh0' has no POSITION"),
-        (broken(meshes__0__primitives=7), r"a\.gltf"),
-        (broken(extensionsRequired=["KHR_draco_mesh_compression"]), r"requires KHR_draco_mesh_compression"),
-        (part(indices=[0, 1, 3]), r"'mesh0': face 0 uses vertex 3; it must be in \[0, 2\]"),
-        (part(indices=[0, 1]), "has 2 indices; triangles need a multiple of 3"),
-        (part(indices=[0, 1], mode=5), "a strip or fan needs at least 3"),
-        (part(colors=COLORS[:, :2]), "has COLOR_0 with 2 components; it must have 3 or 4"),
-        (
-            lambda b: punctual(b, type="spot", spot={"innerConeAngle": 0.7, "outerConeAngle": 0.6}),
-            r"light 0: cone angles are 0\.7 and 0\.6; 0 <= inner <= outer",
-        ),
-    ],
-)
-@pytest.mark.filterwarnings("ignore:.*dropped")
-def test_defects(build, path, change, message):
-    build.mesh(indices=np.array([0, 1, 2], np.uint16))
-    build.json["buffers"] = []
-    change(build)
-    build.gltf(path)
-    with pytest.raises(SceneError, match=message):
-        load(path)
-
-
-@pytest.mark.parametrize(
-    ("material", "message"),
-    [
-        ({"pbrMetallicRoughness": {"metallicFactor": 2}}, r"materials\[0\]\.metallicFactor is 2"),
-        ({"pbrMetallicRoughness": {"baseColorFactor": [1, 1, 1]}}, r"baseColorFactor is \[1, 1, 1\]"),
-        ({"pbrMetallicRoughness": {"baseColorFactor": [2, 1, 1, 1]}}, r"baseColorFactor is .* in \[0, 1\]"),
-        ({"emissiveFactor": [-1, 0, 0]}, r"emissiveFactor"),
-        (glossy(glossinessFactor=2), r"materials\[0\]\.glossinessFactor is 2; it must be in \[0, 1\]"),
-        (glossy(specularFactor=[1, 1]), r"materials\[0\]\.specularFactor is \[1, 1\]"),
-        (glossy(diffuseTexture=3), r"materials\[0\]\.diffuseTexture is 3; it must be an object"),
-        ({"alphaMode": "GLASS"}, r"alphaMode is 'GLASS'; it must be OPAQUE, MASK or BLEND"),
-        ({"name": "red", "normalTexture": {"index": 3}}, r"textures\[3\] does not exist"),
-        ({"normalTexture": 3}, r"materials\[0\]\.normalTexture is 3; it must be an object"),
-        (
-            {"extensions": {"KHR_materials_emissive_strength": {"emissiveStrength": 1e39}}},
-            r"a\.gltf: materials\[0\]\.emissiveStrength is 1e\+39; it must be in \[0, 3\.40282e\+38\]",
-        ),
-        (
-            {"extensions": {"KHR_materials_sheen": [1]}},
-            r"a\.gltf: materials\[0\] is malformed: AttributeError",
-        ),
-    ],
-)
-def test_defects_of_materials(build, path, material, message):
-    build.material(**material).gltf(path)
-    with pytest.raises(SceneError, match=message):
-        load(path)
-
-
 @pytest.mark.parametrize(
     "uri", ["../t.png", "/t.png", "http://example.org/t.png", "sub/../../t.png", "%2e%2e/t.png"]
 )
@@ -1354,13 +1218,6 @@ def test_damaged_images_are_named(build, path):
     assert mesh.material.bsdf.base_color.mean().tolist() == [0.5, 0.5, 0.5]
 
 
-def test_a_missing_buffer_names_both_files(build, path):
-    build.mesh()
-    path.write_text(json.dumps(build.json | {"buffers": [{"byteLength": 36, "uri": "d.bin"}]}))
-    with pytest.raises(SceneError, match=r"a\.gltf: buffers\[0\]: .*d\.bin: there is no such file"):
-        load(path)
-
-
 def test_how_many_pixels_the_images_have_is_limited(build, path):
     """A view of the buffer may serve any number of images."""
     info = build.image(np.zeros((4, 4, 3), np.uint8))
@@ -1376,26 +1233,6 @@ def test_how_many_pixels_the_images_have_is_limited(build, path):
         load(path, limits=LoadLimits(pixels=19))
     with pytest.raises(SceneError, match=r"images\[\d\]: image has 4 × 4 pixels; the limit is 15"):
         load(path, limits=LoadLimits(pixels=15))
-
-
-@pytest.mark.parametrize("part", [0.1, 0.3, 0.6, 0.95, 0.999])
-def test_truncated_glb(build, tmp_path, part):
-    path = build.mesh().glb(tmp_path / "a.glb")
-    data = path.read_bytes()
-    path.write_bytes(data[: int(len(data) * part)])
-    with pytest.raises(SceneError, match=r"a\.glb: "):
-        load(path)
-
-
-def test_damaged_base64_and_short_buffers(build, path):
-    build.mesh().gltf(path)
-    text = path.read_text()
-    path.write_text(text.replace("base64,", "base64,%%%"))
-    with pytest.raises(SceneError, match=r"buffers\[0\] has damaged base64 data"):
-        load(path)
-    path.write_text(text.replace('"buffers": [{"byteLength": 36', '"buffers": [{"byteLength": 99'))
-    with pytest.raises(SceneError, match=r"buffers\[0\] has 36 bytes; it claims 99"):
-        load(path)
 
 
 # ---- in memory equals the file --------------------------------------------------------------------

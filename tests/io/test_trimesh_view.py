@@ -135,9 +135,7 @@ def test_a_light_without_a_transform_stands_at_the_origin(held):
 @pytest.mark.parametrize(
     ("light", "message"),
     [
-        (lighting.PointLight(**white(-1)), r"trimesh object: light 'l': PointLight intensity"),
         (lighting.PointLight(**white(np.nan)), r"light 'l': intensity is \[nan\]; it must be 1 finite"),
-        (lighting.SpotLight(outerConeAngle=0.0, **white(1)), r"light 'l': cone angles are 0 and 0"),
         (lighting.Light, r"light .* is a ABCMeta; it must be one of PointLight, DirectionalLight, SpotLight"),
     ],
 )
@@ -145,6 +143,20 @@ def test_wrong_lights_are_named(held, light, message):
     held.lights = [light]
     held.graph.update(frame_to="l", matrix=np.eye(4))
     with pytest.raises(wf.SceneError, match=message):
+        from_trimesh(held)
+
+
+@pytest.mark.parametrize(
+    ("light", "message"),
+    [
+        (lighting.PointLight(**white(-1)), r"light 'l': intensity is -1; clamped to 0"),
+        (lighting.SpotLight(outerConeAngle=0.0, **white(1)), r"light 'l': outerConeAngle is 0; clamped to"),
+    ],
+)
+def test_numbers_of_lights_are_clamped(held, light, message):
+    held.lights = [light]
+    held.graph.update(frame_to="l", matrix=np.eye(4))
+    with pytest.warns(UserWarning, match=message):
         from_trimesh(held)
 
 

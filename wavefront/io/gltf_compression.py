@@ -91,7 +91,9 @@ class DracoMesh:
         try:
             self._mesh = draco.decode(data)
             self.indices: NDArray[Any] = np.asarray(self._mesh.faces, np.uint32).ravel()
-        except (ValueError, RuntimeError, AttributeError, OverflowError) as error:
+        except MemoryError:
+            raise
+        except Exception as error:  # of types of its own
             raise SceneError(f"{DRACO}: {error}") from error
 
     def __contains__(self, attribute: str) -> bool:

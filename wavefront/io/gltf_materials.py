@@ -18,10 +18,13 @@ from ..textures.normal_map import NormalMap
 from ..textures.parameter import MAX_INDEX
 from .appearance import MaterialSpec, build_material
 from .gltf_anisotropy import Direction, RoughnessAlong
+from .gltf_compression import DRACO, MESHOPT
 from .gltf_document import SHOWN, Document, floats, shown
+from .gltf_nodes import INSTANCING
 from .gltf_specular_glossiness import F0, BesideSpecular
 from .sources import GRAY
 
+WEBP = "EXT_texture_webp"
 WRAPS = {10497: "repeat", 33071: "clamp", 33648: "mirror"}
 NEAREST, LINEAR = 9728, 9729
 IMAGES = 4  # all images of a file may have this many times the pixels of the largest
@@ -39,18 +42,22 @@ class GltfMaterials:
         self._specs: dict[int, MaterialSpec] = {}
         self._images: dict[int, StoredImage | None] = {}
         self._pixels = 0  # of these images
+        self._default = _Reader(self, {}, "").spec() if document.items("materials") else None
         _check_extensions(document)
 
-    def spec(self, index: int) -> MaterialSpec:
-        """Return the appearance of material `index`."""
-        item = self._document.get("materials", index)
-        if index not in self._specs:
-            where = f"materials[{index}]" + (f" {item['name']!r}" if "name" in item else "")
-            with self._document.inside(where):
+    def spec(self, index: Any) -> MaterialSpec | None:
+        """Return the appearance of material `index`; without one that of the default material.
+
+        It is None where the file has no materials: as in formats without them, the mesh is then gray.
+        """
+        if index is not None and (not isinstance(index, int) or index not in self._specs):
+            with self._document.part(f"materials[{shown(index)}]", "the default material in its place"):
+                item = self._document.get("materials", index)
+                where = f"materials[{index}]" + (f" {item['name']!r}" if "name" in item else "")
                 spec = self._specs[index] = _Reader(self, item, where).spec()
-            for what in spec.lost:
-                self._document.lose(what, where)
-        return self._specs[index]
+                for what in spec.lost:
+                    self._document.lose(what, where)
+        return self._specs.get(index, self._default) if isinstance(index, int) else self._default
 
     def texture(
         self, info: Any, where: str, instead: StoredImage | None = None, **arguments: Any
@@ -63,22 +70,23 @@ class GltfMaterials:
         if not isinstance(info, dict):
             raise SceneError(f"{document.name}: {where} is {shown(info)}; it must be an object")
         item = document.get("textures", info.get("index"))
-        if "source" not in item:
-            listed = ", ".join(item.get("extensions", {})) or "nothing"
-            raise SceneError(f"{document.name}: {where}: its image is given by {listed}, which is not read")
+        image = self._image(_source(item), where, instead)
+        if image is None:
+            return None
         move = info.get("extensions", {}).get("KHR_texture_transform", {})
         uv_set = move.get("texCoord", info.get("texCoord", 0))
         if uv_set not in (0, 1):
             document.lose(f"TEXCOORD_{uv_set}", where)
-        sampler = document.get("samplers", item["sampler"]) if "sampler" in item else {}
-        image = self._image(item["source"], where, instead)
-        if image is None:
-            return None
+        sampler, transform = {}, None
+        with document.part(f"{where}: its sampler"):
+            sampler = document.get("samplers", item["sampler"]) if "sampler" in item else {}
+        with document.part(f"{where}: KHR_texture_transform"):
+            transform = _uv_matrix(move) if move else None
         return Texture(
             image,
             wrap=(_wrap(sampler, "wrapS"), _wrap(sampler, "wrapT")),
             filter=self._filter(sampler, where),
-            transform=_uv_matrix(document, move, where) if move else None,
+            transform=transform,
             uv_set=1 if uv_set == 1 else 0,
             **arguments,
         )
@@ -121,6 +129,16 @@ class GltfMaterials:
         return image
 
 
+def _source(item: dict[str, Any]) -> Any:
+    """Return the number of the image of a texture."""
+    extensions = item.get("extensions", {})
+    if WEBP in extensions:
+        return extensions[WEBP].get("source")
+    if "source" not in item:
+        raise SceneError(f"its image is given by {', '.join(extensions) or 'nothing'}, which is not read")
+    return item["source"]
+
+
 def _called(item: dict[str, Any], index: int) -> str:
     """Return what messages call an image."""
     uri = item.get("uri")
@@ -133,7 +151,8 @@ class _Reader:
 
     def __init__(self, materials: GltfMaterials, item: dict[str, Any], where: str) -> None:
         self._materials, self._item, self._where = materials, item, where
-        self._file = materials._document.name
+        self._document = materials._document
+        self._file, self._losses = self._document.name, self._document.files.losses
         self._wanted: dict[str, Any] = {}
         self._lost: list[str] = []
         self._alpha_given: Any = None
@@ -163,29 +182,33 @@ class _Reader:
         """Read the extensions of metallic-roughness."""
         for name, read in EXTENSIONS.items():
             if extensions.get(name) is not None:
-                read(self, extensions[name])
+                with self._document.part(f"{self._where}: {name}"):
+                    read(self, extensions[name])
         self._lost += [name for name in extensions if name not in KNOWN]
 
     def _number(self, group: dict[str, Any], key: str, default: float, high: float = 1.0) -> float:
-        value = floats(f"{self._file}: {self._where}.{key}", [group.get(key, default)], 1)[0]
-        if not 0 <= value <= high:
-            raise SceneError(f"{self._file}: {self._where}.{key} is {value:g}; it must be in [0, {high:g}]")
-        return float(value)
+        return float(self._numbers(group, key, [default], high)[0])
 
     def _color(self, group: dict[str, Any], key: str, default: list[float], high: float = 1.0) -> Doubles:
-        value = floats(f"{self._file}: {self._where}.{key}", group.get(key, default), len(default))
-        if (value < 0).any() or (value > high).any():
-            raise SceneError(
-                f"{self._file}: {self._where}.{key} is {value.tolist()}; it must be in [0, {high:g}]"
-            )
-        return value
+        return self._numbers(group, key, default, high)
+
+    def _numbers(self, group: dict[str, Any], key: str, default: list[float], high: float) -> Doubles:
+        """Return numbers, clamped to [0, high], or their defaults, where they are malformed."""
+        place, value = f"{self._where}.{key}", group.get(key, default)
+        found = np.array(default)
+        with self._document.part(place, "the default in its place"):
+            found = floats(place, [value] if len(default) == 1 and key in group else value, len(default))
+        return self._losses.within(place, found, 0, high)
 
     def _texture(
         self, group: dict[str, Any], key: str, instead: StoredImage | None = None, **arguments: Any
     ) -> Texture | None:
+        place = f"{self._where}.{key}"
         if key not in group:
             return None
-        return self._materials.texture(group[key], f"{self._where}.{key}", instead, **arguments)
+        with self._document.part(place, "left out" if instead is None else "gray in its place"):
+            return self._materials.texture(group[key], place, instead, **arguments)
+        return None if instead is None else Texture(instead, **arguments)
 
     def _scalar(self, group: dict[str, Any], factor: str, texture: str, channel: int, default: float) -> Any:
         """Return a factor, or the texture that it scales."""
@@ -236,10 +259,11 @@ class _Reader:
         """Read the opacity of a base color: a factor, and the fourth channel of the texture `key`."""
         mode = self._item.get("alphaMode", "OPAQUE")
         if mode not in ("OPAQUE", "MASK", "BLEND"):
-            raise SceneError(
-                f"{self._file}: {self._where}.alphaMode is {shown(mode)}; it must be OPAQUE, MASK or BLEND"
+            place = f"{self._where}.alphaMode"
+            self._losses.note(
+                place, value=shown(mode), done="OPAQUE in its place, as it must be OPAQUE, MASK or BLEND"
             )
-        if mode == "OPAQUE":
+        if mode not in ("MASK", "BLEND"):
             return
         if mode == "MASK":
             self._cutoff = self._number(self._item, "alphaCutoff", 0.5, high=np.inf)
@@ -257,12 +281,11 @@ class _Reader:
         texture = self._texture(self._item, "normalTexture", srgb=False)
         if texture is None:
             return None
-        where = f"{self._file}: {self._where}.normalTexture"
-        scale = floats(f"{where}.scale", [self._item["normalTexture"].get("scale", 1)], 1)[0]
-        try:
+        where = f"{self._where}.normalTexture"
+        with self._document.part(where):
+            scale = floats(f"{where}.scale", [self._item["normalTexture"].get("scale", 1)], 1)[0]
             return NormalMap(texture, scale)
-        except SceneError as error:
-            raise SceneError(f"{where}: {error}") from error
+        return None
 
     def _ior(self, group: dict[str, Any]) -> None:
         ior = self._number(group, "ior", 1.5, high=MAX_INDEX)
@@ -292,7 +315,7 @@ class _Reader:
         strength = self._scalar(group, "anisotropyStrength", "anisotropyTexture", 2, 0.0)
         if not isinstance(strength, Texture) and strength == 0:
             return
-        where = f"{self._file}: {self._where}.anisotropyRotation"
+        where = f"{self._where}.anisotropyRotation"
         degrees = np.degrees(floats(where, [group.get("anisotropyRotation", 0.0)], 1)[0])
         vectors = self._texture(group, "anisotropyTexture", srgb=False)
         across = self._wanted["roughness"]
@@ -346,13 +369,16 @@ class _Reader:
         if "attenuationDistance" in group and (color < 1).any():
             distance = self._number(group, "attenuationDistance", 1.0, high=np.inf)
             if distance == 0:
-                raise SceneError(f"{self._file}: {self._where}.attenuationDistance is 0; it must be above 0")
+                raise SceneError("attenuationDistance is 0; it must be above 0")
             distance = max(distance, float(np.finfo(np.float32).tiny))  # what float32 can divide by
             with np.errstate(over="ignore"):
                 self._wanted["absorption"] = -log(np.maximum(color, 1e-6).astype(np.float32)) / distance
 
     def _emission(self, strength: dict[str, Any]) -> Doubles | Texture | None:
-        factor = self._color(self._item, "emissiveFactor", [0.0, 0.0, 0.0])
+        factor = self._color(self._item, "emissiveFactor", [0.0, 0.0, 0.0], high=FLOAT32_MAX)
+        if (factor > 1).any():
+            place = f"{self._where}.emissiveFactor"
+            self._losses.note(place, value=f"{factor.tolist()}, above 1", done="taken as it is")
         factor = factor * self._number(strength, "emissiveStrength", 1.0, high=FLOAT32_MAX)
         if not factor.any():
             return None
@@ -375,30 +401,36 @@ EXTENSIONS: dict[str, Callable[[_Reader, dict[str, Any]], None]] = {
     "KHR_materials_volume": _Reader._volume,
 }
 # extensions whose properties are all read here or in gltf.py
-KNOWN = {*EXTENSIONS, *BESIDE, "KHR_lights_punctual", "KHR_mesh_quantization", "EXT_mesh_gpu_instancing"}
+KNOWN = {
+    *EXTENSIONS,
+    *BESIDE,
+    "KHR_lights_punctual",
+    "KHR_mesh_quantization",
+    INSTANCING,
+    DRACO,
+    *MESHOPT,
+    WEBP,
+}
+HARMLESS = {"KHR_xmp_json_ld", "KHR_materials_variants"}  # without effect on the picture of the file as it is
 
 
 def _check_extensions(document: Document) -> None:
-    with document.inside("extensionsRequired"):
-        for name in document.json.get("extensionsRequired", []):
-            if name not in KNOWN and name != "KHR_materials_unlit":
-                raise SceneError(f"{document.name}: requires {str(name)[:SHOWN]}, which is not read")
-    with document.inside("extensionsUsed"):
-        for name in document.json.get("extensionsUsed", []):
-            if name not in KNOWN:
-                document.lose(name, "the file")
+    """Note the extensions that are not read; what they give is left out, part by part."""
+    required = document.items("extensionsRequired")
+    for name in dict.fromkeys(map(str, (*required, *document.items("extensionsUsed")))):
+        if name not in KNOWN and name not in HARMLESS:
+            document.lose(f"{name[:SHOWN]}{', which it requires' if name in required else ''}", "the file")
 
 
 def _wrap(sampler: dict[str, Any], key: str) -> Any:
     return WRAPS.get(sampler.get(key, 10497), "repeat")
 
 
-def _uv_matrix(document: Document, move: dict[str, Any], where: str) -> Doubles:
+def _uv_matrix(move: dict[str, Any]) -> Doubles:
     """Return KHR_texture_transform as a matrix for v upwards."""
-    place = f"{document.name}: {where} KHR_texture_transform"
-    offset = floats(place + " offset", move.get("offset", [0, 0]), 2)
-    scale = floats(place + " scale", move.get("scale", [1, 1]), 2)
-    angle = floats(place + " rotation", [move.get("rotation", 0)], 1)[0]
+    offset = floats("offset", move.get("offset", [0, 0]), 2)
+    scale = floats("scale", move.get("scale", [1, 1]), 2)
+    angle = floats("rotation", [move.get("rotation", 0)], 1)[0]
     sin, cos = sin_cos_turns(np.float64(angle / (2 * np.pi)))
     # the signs follow the extension's example (a quarter turn that ends in the lower left), as viewers do;
     # the GLSL beside that example turns in the opposite direction
@@ -407,5 +439,5 @@ def _uv_matrix(document: Document, move: dict[str, Any], where: str) -> Doubles:
     )
     matrix = FLIP @ moved @ FLIP
     if not np.abs(matrix).max() <= FLOAT32_MAX:
-        raise SceneError(f"{place}: an element of its matrix is beyond float32")
+        raise SceneError("an element of its matrix is beyond float32")
     return matrix

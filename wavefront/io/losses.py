@@ -76,8 +76,8 @@ class Losses:
         except SceneError as error:
             if passed_limit(error):
                 raise
-            what = str(error).removeprefix(f"{self.name}: ")
-            self.note(what.removeprefix(f"{place}: ").removeprefix(f"{place} "), place, done=done)
+            what = str(error).removeprefix(f"{self.name}: ").removeprefix(f"{place}: ")
+            self.note(what, "" if place and what.startswith(place) else place, done=done)
 
     def within(
         self, part: str, value: ArrayLike, low: float = 0.0, high: float = 1.0, place: str = ""
