@@ -165,7 +165,7 @@ def _with_uvs_of_corners(files: SceneFiles, raw: RawMesh, rows: dict[str, Rows],
     wrong = (counts != 2 * corners) & ~bad_rows(face)
     done = "0 in place of texture coordinates"
     note_rows(files.losses, face, wrong, "with texture coordinates that do not fit the corners", done)
-    apart = with_corners_apart(files.name, raw)
+    apart = with_corners_apart(raw)
     begin = np.cumsum(counts) - counts, np.cumsum(corners) - corners
     at = begin[0][faces.row][:, None] + 2 * (faces.corner - begin[1][faces.row][:, None])
     at = np.where(wrong[faces.row][:, None], len(values), at).ravel()
@@ -204,7 +204,7 @@ def _colored(files: SceneFiles, raw: RawMesh, rows: dict[str, Rows], faces: Face
                 files.losses.note(f"{what} colors")
         return raw
     if of_faces is not None and (of_vertices is None or (of_vertices == 1).all()):
-        raw = with_corners_apart(files.name, raw)
+        raw = with_corners_apart(raw)
         raw.colors = np.repeat(of_faces[faces.row], 3, 0)
     elif of_vertices is not None:
         if of_faces is not None:

@@ -173,7 +173,7 @@ def _mesh(data: Any, points: Table, corners: Any, look: Look) -> RawMesh:
     of_points = len(shown.values) == len(points) and not _of_cells(data, look)
     rows = shown.values if of_points else shown.values[len(shown.values) - len(corners) :]
     if not of_points:
-        raw, rows = with_face_colors(NAME, raw, np.ones((len(corners), 4))), np.repeat(rows, 3, 0)
+        raw, rows = with_face_colors(raw, np.ones((len(corners), 4))), np.repeat(rows, 3, 0)
         raw.colors = None
     if shown.colors is None:
         raw.colors, raw.material = rows, _color_material(rows, look)

@@ -45,7 +45,7 @@ def read(geometry: Any, source: str, losses: Losses) -> Contents:
     for mesh, name, _, _ in nodes:
         if id(mesh) not in numbers:
             numbers[id(mesh)] = len(raws)
-            raws.append(_raw(mesh, name, losses))
+            raws.append(_raw(mesh, name))
             specs.assign_material(raws[-1], mesh, {geometry.source.file_type, mesh.source.file_type})
     of = np.array([numbers[id(mesh)] for mesh, *_ in nodes], np.intp)
     matrices = np.array([matrix for *_, matrix, _ in nodes]).reshape(-1, 4, 4)
@@ -78,7 +78,7 @@ def _nodes(geometry: Any, trimesh: Any) -> list[tuple[Any, str, Matrix, str]]:
     return out
 
 
-def _raw(mesh: trimesh.Trimesh, name: str, losses: Losses) -> RawMesh:
+def _raw(mesh: trimesh.Trimesh, name: str) -> RawMesh:
     # reading `vertex_normals` would compute them; the cache shows whether they exist
     normals = np.asarray(mesh.vertex_normals) if "vertex_normals" in mesh._cache.cache else None
     uvs = getattr(mesh.visual, "uv", None)
@@ -89,7 +89,7 @@ def _raw(mesh: trimesh.Trimesh, name: str, losses: Losses) -> RawMesh:
     raw.uvs = None if uvs is None else np.asarray(uvs, np.float64)[:, :2]
     raw.colors = _vertex_colors(mesh)
     painted = _face_colors(mesh)
-    return raw if painted is None else with_face_colors(losses, raw, painted)
+    return raw if painted is None else with_face_colors(raw, painted)
 
 
 class _Visuals:

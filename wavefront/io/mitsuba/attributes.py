@@ -58,7 +58,7 @@ def with_attribute(name: str, raw: RawMesh, node: Node) -> RawMesh:
     if there[0].startswith("face_"):
         if len(rgba) != len(raw.faces):
             raise SceneError(f"{name}: has {len(rgba)} rows of {there[0]} and {len(raw.faces)} triangles")
-        return with_face_colors(node.lost, raw, rgba)
+        return with_face_colors(raw, rgba)
     raw.colors = rgba
     return raw
 
