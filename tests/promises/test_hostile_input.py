@@ -267,7 +267,7 @@ CASES: dict[str, dict[str, tuple[Write, str]]] = {
         ),
         "gltf": (
             gltf(lambda json: json["buffers"][0].update(uri="../a.bin")),
-            r"a\.gltf: refers to '\.\./a\.bin', which is outside",
+            r"a\.gltf: .*refers to '\.\./a\.bin', which is outside",
         ),
         "gltf, coded": (
             gltf(lambda json: json["buffers"][0].update(uri="%2e%2e/a.bin")),
