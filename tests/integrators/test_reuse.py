@@ -9,8 +9,13 @@ from scipy import stats
 from significance import Mean, assert_mean, assert_same_images, render, repeat
 
 import wavefront as wf
+from wavefront.accel import make_accelerator
+from wavefront.compile.scene import compile_scene
+from wavefront.integrators import li_reuse
+from wavefront.sampling.sampler import SobolSampler
 from wavefront.sampling.tiles import PictureTiles, others_in_tile, place_in_tiles
 from wavefront.stages import reuse
+from wavefront.stages.generate import generate
 
 # --- Tiles ----------------------------------------------------------------------------------------
 
@@ -259,6 +264,29 @@ def test_waves_and_workers_change_no_bit(cut: dict) -> None:
     options = {"reuse": True, "branches": 2}
     whole = render(scene, 2, **options)
     assert render(scene, 2, **options, **cut).rgb.tobytes() == whole.rgb.tobytes()
+
+
+def test_a_wave_of_many_paths_is_as_several_of_few() -> None:
+    """Each point that is shared gets light along several ways, in the same order in any wave."""
+    red, gold = wf.OrenNayar((0.8, 0.3, 0.3)), wf.Conductor.named("gold", roughness=0.5)
+    shapes = [
+        scenes.box((-1, -1, -1), (1, 1, 1), wf.Diffuse(0.7), inward=True),
+        wf.Rectangle((-0.9, -1, -0.9), (1.8, 0, 0), (0, 1.8, 0), material=red),
+        wf.Rectangle((-0.9, -0.9, 0.9), (0, 0, -1.8), (0, 1.8, 0), material=gold),
+        scenes.panel((-0.3, -0.3), (0.3, 0.3), 0.99, 8.0),
+    ]
+    camera = wf.Camera.look_at((0, 0, 0.9), (0, 0, 0), fov=90, size=(56, 56))
+    scene = compile_scene(wf.Scene(shapes), lambda geometry: make_accelerator(geometry, "numpy"), mis=True)
+    view, sampler = scene.view(camera), SobolSampler(0, 56)
+    pixels = np.arange(56 * 56, dtype=np.uint32)
+
+    def traced(samples: range) -> np.ndarray:
+        sample = np.repeat(np.array(samples, np.uint32), pixels.size)
+        paths = generate(scene, view, sampler, np.tile(pixels, len(samples)), sample)
+        return li_reuse(scene, paths, sampler, 4, tiles=view.tiles)
+
+    part, whole = traced(range(1)), traced(range(6))
+    assert part.tobytes() == whole[:, : pixels.size].tobytes()
 
 
 def test_pixels_that_need_more_samples_share_them_in_any_wave() -> None:

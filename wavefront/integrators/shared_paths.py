@@ -23,9 +23,6 @@ from ..stages.shade import Shading, direct
 from .ladder import li_full
 from .steps import accumulate, intersect_and_compact, prepare_shading, scatter
 
-JOINED_AFTER = 3  # bounces: a quarter of the paths is left then
-FEW = 1 << 14  # paths that go on together sooner
-
 
 def li_reuse(
     scene: CompiledScene,
@@ -128,13 +125,10 @@ class Sharing:
     def _step(self, ways: Ways, bounce: int, L: Floats) -> Ways:
         """Follow paths from the surfaces of a bounce to the next ones, and add the light that they find to L.
 
-        The ways go on one after the other, as smaller arrays fit the cache, and together once few paths are
-        left.
+        From there on all ways are one: the order in which points get light is the same in any wave.
         """
         leaving = [self._scatter(*way, bounce, L) for way in ways if len(way[0])]
-        if len(leaving) > 1 and (bounce >= JOINED_AFTER or sum(map(len, leaving)) < FEW):
-            leaving = [Paths.concatenate(leaving)]
-        return [self._onward(paths, bounce, L) for paths in leaving]
+        return [self._onward(Paths.concatenate(leaving), bounce, L)] if leaving else []
 
     def _scatter(self, paths: Paths, hits: Hits, bounce: int, L: Floats) -> Paths:
         """Add direct light to L, and return the paths that go on in new directions."""
