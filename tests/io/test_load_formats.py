@@ -170,8 +170,8 @@ def test_dae(write, image):
     matrix = '<node><matrix>1 0 0 5 0 1 0 0 0 0 1 0 0 0 0 1</matrix><instance_geometry url="#g">{bind}'
     path = write(dae(matrix + "</instance_geometry></node>"), "a.dae")
     (mesh,) = load_meshes(path, strict=True)
-    # neither up_axis nor unit counts, and corners with normals of their own stay apart
-    assert np.array_equal(soup(mesh)[:, :, 0], [[5, 6, 6], [5, 6, 5]])
+    # meters; up_axis turns nothing, and corners with normals of their own stay apart
+    assert soup(mesh)[:, :, 0] == pytest.approx(np.array([[0.05, 0.06, 0.06], [0.05, 0.06, 0.05]]))
     assert np.array_equal(soup(mesh, mesh.normals)[:, 0], [[0, 0, 1], [0, 1, 0]])
     assert np.array_equal(soup(mesh, mesh.uvs)[0], [[0, 0], [1, 0], [1, 1]])
     assert (
@@ -259,7 +259,11 @@ def multiplied(levels, width=10):
         (dae('<node id="n"><instance_node url="#n"/></node>'), r"a\.dae: node '#n' holds itself"),
         (dae("<node>" * 200 + "</node>" * 200), r"a\.dae: its nodes are nested deeper than 128"),
         (dae("<node/>"), r"a\.dae: has no faces"),
-        (dae().replace("0 0 0 1 0 1 2 0 2", "0 0 0 1 0 1 9 0 2"), r"a\.dae: .* all parts of its geometry"),
+        (
+            dae().replace("0 0 0 1 0 1 2 0 2", "0 0 0 1 0 1 9 0 2"),
+            r"a\.dae: has no faces: 1 of 1 parts of its geometry is damaged; left out",
+        ),
+        (dae().replace("<scene>", "<!--").replace("</scene>", "-->"), r"a\.dae: .*it has no scene"),
     ],
 )
 def test_damaged_dae(write, image, data, message):
@@ -299,14 +303,14 @@ def package(content=None, **others):
 
 def test_3mf(write):
     (mesh,) = load_meshes(write(package(), "a.3mf"), strict=True)
-    assert np.array_equal(soup(mesh)[0], [[0, 0, 0], [1, 0, 0], [0, 1, 0]])
+    assert soup(mesh)[0] == pytest.approx(np.array([[0, 0, 0], [0.001, 0, 0], [0, 0.001, 0]]))  # meters
     build = '<item objectid="1"/><item objectid="1" transform="1 0 0 0 1 0 0 0 1 5 0 0"/>'
     scene = load(write(package(model(build=build)), "a.3mf"))
     assert len(scene.shapes) == 2
     found = sorted(
         mesh.vertices[:, 0].min() for mesh in load_meshes(write(package(model(build=build)), "a.3mf"))
     )
-    assert found == [0, 5]
+    assert found == pytest.approx([0, 0.005])
 
 
 def test_3mf_equals_the_object_in_memory(tmp_path):
@@ -314,8 +318,8 @@ def test_3mf_equals_the_object_in_memory(tmp_path):
     ball.export(tmp_path / "a.3mf")
     (mesh,) = load_meshes(tmp_path / "a.3mf")
     (again,) = from_trimesh(trimesh.load_scene(tmp_path / "a.3mf", process=False)).shapes
-    assert np.array_equal(soup(mesh), soup(again))
-    assert soup(mesh) == pytest.approx(ball.triangles, abs=1e-5)
+    assert soup(mesh) == pytest.approx(0.001 * soup(again))
+    assert soup(again) == pytest.approx(ball.triangles, abs=1e-5)
 
 
 def test_what_is_not_read_of_3mf_is_named(write):
@@ -375,6 +379,7 @@ def test_several_meshes_of_a_member_of_3mf(write):
     other = model(f'<object id="2">{MESH}</object><object id="3">{MESH}</object>', "")
     build = '<item objectid="1" transform="0 1 0 -1 0 0 0 0 1 0 0 0"/>'
     content = model(f'<object id="1"><components>{parts}</components></object>', build)
+    content = content.replace("millimeter", "meter")
     found = load_meshes(write(package(content, **{"b.model": other}), "a.3mf"), strict=True)
     assert [mesh.vertices.tolist() for mesh in found] == [
         [[0, x, 0], [0, x + 1, 0], [-1, x, 0]] for x in (5, 9)
@@ -406,30 +411,113 @@ def components(levels, width=10):
             "itself",
         ),
         (package(model("", "")), r"a\.3mf"),
-        (package(model(build='<item objectid="7"/>')), r"build refers to object .*#7, which does not exist"),
-        (package(model(MESH.join(['<object id="1">', "</object>"]).replace('x="0"', ""))), "x is missing"),
-        (package(model(MESH.join(['<object id="1">', "</object>"]).replace('x="1"', 'x="b"'))), "x is 'b'"),
-        (package(model(build='<item objectid="1" transform="1 2"/>')), "transform has 2 numbers"),
         (
-            package(model(f'{COLORS}<object id="1" pid="5" pindex="2">{MESH}</object>')),
-            "group 5 has 2 colors, not number 2",
+            package(model(build='<item objectid="7"/>')),
+            r"has no faces: build refers to object .*#7, which does not exist; left out",
+        ),
+        (package(model(f'<object id="1">{MESH}</object>'.replace('x="0"', ""))), r"x is missing; left out"),
+        (package(model(f'<object id="1">{MESH}</object>'.replace('x="1"', 'x="b"'))), "x is 'b'; left out"),
+        (package(model(f'<object id="1">{MESH}</object>'.replace('v3="2"', ""))), "v3 is missing; left out"),
+    ],
+)
+def test_3mf_without_a_mesh(write, data, message):
+    with pytest.raises(SceneError, match=message):
+        load_meshes(write(data, "a.3mf"))
+
+
+PAIR = MESH.replace("</triangles>", '<triangle v1="0" v2="1" v3="2"/></triangles>')
+PAIR = PAIR.replace("</vertices>", '<vertex x="1" y="1" z="0"/></vertices>')
+
+
+def part(mesh=PAIR, own="", colors=""):
+    return model(f'{colors}<object id="1" {own}>{mesh}</object>')
+
+
+@pytest.mark.parametrize(
+    ("content", "message"),
+    [
+        (
+            part(PAIR.replace('v3="2"', 'v3="9"', 1)),
+            "1 triangle with a vertex beyond the 4, first: triangle 0",
+        ),
+        (part(PAIR.replace('v3="2"', 'v3="-1"', 1)), "1 triangle with a vertex beyond the 4"),
+        (part(PAIR.replace('v3="2"', 'v3="x"', 1)), r"3D/3dmodel\.model: v3 is 'x'; left out"),
+        (part(PAIR.replace('v3="2"', f'v3="{2**63}"', 1)), "1 triangle with a vertex beyond the 4"),
+        (
+            part(PAIR.replace('v3="2"', 'v3="3"', 1).replace('x="1" y="1"', 'x="1" y="x"')),
+            "y is 'x'; left out",
         ),
         (
-            package(model(f'{COLORS}<object id="1" pid="5" pindex="0">{MESH}</object>'.replace("#FF8", "x"))),
-            "which is no color",
+            model(f'<object id="1">{MESH}</object>', '<item objectid="1"/><item objectid="7"/>'),
+            "build refers to",
+        ),
+        (
+            model(
+                f'<object id="1">{MESH}</object>',
+                '<item objectid="1"/><item objectid="1" transform="1e300 0 0 0 1 0 0 0 1 5 0 0"/>',
+            ),
+            "the matrix of object .*#1 is beyond all limits; left out",
+        ),
+        (
+            model(f'<object id="1">{MESH}</object>', '<item objectid="1" transform="1 2"/>'),
+            "transform is '1 2'; left out, as it must be 12 numbers",
+        ),
+        (part(MESH, 'pid="5" pindex="2"', COLORS), "group 5 has 2 colors, not number 2; gray in its place"),
+        (part(MESH, 'pid="5" pindex="x"', COLORS), "pindex is 'x'; left out"),
+        (
+            part(MESH, 'pid="5" pindex="0"', COLORS.replace("#FF8", "x")),
+            "group 5 has 'x800', which is no color; gray in its place",
+        ),
+        (
+            part(MESH).replace('unit="millimeter"', 'unit="parsec"'),
+            "unit is 'parsec'; millimeter in its place",
         ),
     ],
 )
-def test_damaged_3mf(write, data, message):
+def test_damaged_parts_of_3mf_cost_no_more_than_themselves(write, content, message):
+    path = write(package(content), "a.3mf")
+    with pytest.warns(UserWarning, match=message) as record:
+        (mesh,) = load_meshes(path)
+    assert len(record) == 1
+    assert soup(mesh)[:, :, 0] == pytest.approx(np.array([[0, 0.001, 0]]))
+    if mesh.material is not None and not getattr(mesh.material.bsdf.reflectance, "texture", None):
+        assert mesh.material.bsdf.reflectance.ravel() == pytest.approx([0.5] * 3)
     with pytest.raises(SceneError, match=message):
-        load_meshes(write(data, "a.3mf"))
+        load_meshes(path, strict=True)
+
+
+@pytest.mark.parametrize(
+    ("unit", "meters"),
+    [("micron", 1e-6), ("centimeter", 0.01), ("inch", 0.0254), ("foot", 0.3048), ("meter", 1), (None, 0.001)],
+)
+def test_units_of_3mf_and_dae(write, image, unit, meters):
+    """As those of USD."""
+    written = "" if unit is None else f'unit="{unit}"'
+    scene = load(write(package(model().replace('unit="millimeter"', written)), "a.3mf"), strict=True)
+    assert np.ptp(scene.bounds, 0) == pytest.approx([meters, meters, 0], rel=1e-6)
+    assert scene.up.tolist() == [0, 0, 1]
+    written = "" if unit is None else f'<unit name="{unit}" meter="{meters}"/>'
+    scene = load(write(dae().replace('<unit meter="0.01"/>', written), "a.dae"), strict=True)
+    assert np.ptp(scene.bounds, 0) == pytest.approx(
+        [meters if unit else 1, meters if unit else 1, 0], rel=1e-6
+    )
+
+
+@pytest.mark.parametrize("meter", ["0", "-1", "nan", "inf"])
+def test_units_of_dae_that_are_none(write, image, meter):
+    path = write(dae().replace('meter="0.01"', f'meter="{meter}"'), "a.dae")
+    with pytest.warns(UserWarning, match=rf"a\.dae: unit is {meter} meters; 1 in its place$"):
+        (mesh,) = load_meshes(path)
+    assert np.ptp(mesh.vertices[:, 0]) == 1
 
 
 @pytest.mark.parametrize("element", ["inf", "nan", "1e300"])
 def test_matrices_of_3mf_that_are_not_finite_are_named(write, element):
     """Found by damaged files: a matrix that is not finite gave a warning of NumPy."""
     build = f'<item objectid="1" transform="{element} 0 0 0 1 0 0 0 1 5 0 0"/>'
-    with pytest.raises(SceneError, match=r"a\.3mf: .*(matrix|not a readable 3mf)"):
+    with pytest.raises(
+        SceneError, match=r"a\.3mf: has no faces: the matrix of object .* is beyond all limits"
+    ):
         load_meshes(write(package(model(build=build)), "a.3mf"))
 
 
@@ -465,9 +553,9 @@ PART = model(
         ([("x/3D/3DModel.MODEL.bak", SPY + model()[38:])], r"MODEL\.bak line 1: has a document type"),
         (
             [("3D/3dmodel.model", PART("a.xml")), ("parts/a.xml", SPY + model()[38:])],
-            r"refers to 'parts/a\.xml', which is no model",
+            r"refers to object parts/a\.xml#2, which does not exist",
         ),
-        ([("3D/3dmodel.model", PART("a.model"))], r"refers to 'parts/a\.model', which is no model"),
+        ([("3D/3dmodel.model", PART("a.model"))], r"refers to object parts/a\.model#2, which does not exist"),
         ([("3D/3dmodel.txt", model())], "has no member '3d/3dmodel.model'"),
     ],
 )

@@ -192,7 +192,47 @@ def Mesh "m" {{
 """
 
 
+SOURCE = """<source id="{0}"><float_array id="{0}a" count="{1}">{2}</float_array><technique_common>
+<accessor source="#{0}a" count="{3}" stride="{4}">{5}</accessor></technique_common></source>"""
+DAE = """<?xml version="1.0"?>
+<COLLADA xmlns="http://www.collada.org/2005/11/COLLADASchema" version="1.4.1"><asset/>
+<library_geometries><geometry id="g"><mesh>{}
+<vertices id="vs"><input semantic="POSITION" source="#v"/></vertices>{}</mesh></geometry></library_geometries>
+<library_visual_scenes><visual_scene id="s"><node><instance_geometry url="#g"/></node></visual_scene>
+</library_visual_scenes><scene><instance_visual_scene url="#s"/></scene></COLLADA>"""
+
+
+def source(name, rows, axes):
+    params = "".join(f'<param name="{axis}" type="float"/>' for axis in axes)
+    values = " ".join(str(value) for row in rows for value in row)
+    return SOURCE.format(name, len(rows) * len(axes), values, len(rows), len(axes), params)
+
+
+def dae(polygons, kind="polylist", holes=()):
+    """A document of polylist or of polygons; each of `holes` is one more polygon, and its holes."""
+    corners, faces = numbered([*polygons, *(ring for rings in holes for ring in rings)])
+    uvs = [(x, y) for x, y in corners]
+    sources = source("v", [(x, y, 0) for x, y in corners], "XYZ") + source("w", uvs, "ST")
+    sources += source("n", [(0, 0, 1)], "XYZ")
+    rows = [" ".join(f"{i} 0 {i}" for i in face) for face in faces]
+    inputs = (
+        '<input semantic="VERTEX" source="#vs" offset="0"/><input semantic="NORMAL" source="#n" offset="1"/>'
+    )
+    inputs += '<input semantic="TEXCOORD" source="#w" offset="2" set="0"/>'
+    if kind == "polylist":
+        counts = " ".join(str(len(face)) for face in faces)
+        content = f"{inputs}<vcount>{counts}</vcount><p>{' '.join(rows)}</p></polylist>"
+        return DAE.format(sources, f'<polylist count="{len(faces)}">{content}')
+    plain, rest = rows[: len(polygons)], iter(rows[len(polygons) :])
+    content = "".join(f"<p>{row}</p>" for row in plain)
+    for rings in holes:
+        content += f"<ph><p>{next(rest)}</p>" + "".join(f"<h>{next(rest)}</h>" for _ in rings[1:]) + "</ph>"
+    return DAE.format(sources, f'<polygons count="{len(plain) + len(holes)}">{inputs}{content}</polygons>')
+
+
 WRITERS = {
+    "polylist.dae": dae,
+    "polygons.dae": lambda polygons: dae(polygons, "polygons"),
     "obj": obj,
     "ply": ply,
     "little.ply": lambda polygons: ply(polygons, "binary_little_endian"),
@@ -242,8 +282,58 @@ def test_polygons_with_a_bad_vertex_are_left_out_as_a_whole(tmp_path):
 def test_hole_indices_and_orientation_of_usd(tmp_path, handed):
     pytest.importorskip("pxr")
     more = f'int[] holeIndices = [1]\n    uniform token orientation = "{handed}"'
-    (tmp_path / "a.usda").write_text(usda([L, SQUARE, DART], more))
+    text = usda([L, SQUARE, DART], more)
+    if handed == "leftHanded":
+        text = text.replace("(0, 0, 1)", "(0, 0, -1)")
+    (tmp_path / "a.usda").write_text(text)
     (mesh,) = load(tmp_path / "a.usda", strict=True).shapes
     found = areas(mesh.vertices, mesh.faces)[:, 2] / 2 * (1 if handed == "rightHanded" else -1)
     assert (found > 0).all()
     assert found.sum() == pytest.approx(area(L) + area(DART))
+
+
+def moved(ring, x, y, scale=1.0):
+    return [(scale * a + x, scale * b + y) for a, b in ring]
+
+
+WALLS = [
+    [SQUARE, RING],  # holes may wind either way
+    [SQUARE, RING[::-1]],
+    [SQUARE[::-1], RING],
+    [moved(SQUARE, 0, 0, 4), moved(RING, -2, -2), moved(RING[::-1], 2, 2), moved(RING, 2, -2, 2)],
+]
+
+
+@pytest.mark.parametrize("rings", WALLS)
+@pytest.mark.parametrize("beside", [[], [L, SQUARE]])
+def test_polygons_with_holes_of_dae(tmp_path, rings, beside):
+    (tmp_path / "a.dae").write_text(dae(beside, "polygons", [rings, [SQUARE]]))
+    mesh = load_mesh(tmp_path / "a.dae", strict=True)
+    found = areas(mesh.vertices, mesh.faces)[:, 2] / 2
+    whole = abs(area(rings[0])) - sum(abs(area(ring)) for ring in rings[1:])
+    turn = np.sign(area(rings[0]))
+    assert found.sum() == pytest.approx(turn * whole + 4 + sum(map(area, beside)))
+    assert np.abs(found).sum() == pytest.approx(whole + 4 + sum(map(area, beside)))
+    assert np.array_equal(mesh.uvs, mesh.vertices[:, :2])
+
+
+@pytest.mark.parametrize(
+    ("change", "message", "expected"),
+    [
+        (
+            ("<vcount>6 4 3", "<vcount>6 4 2"),
+            "1 polygon with fewer than 3 corners or an index below 0; left out",
+            7,
+        ),
+        (("<vcount>6 4 3", "<vcount>6 4 9"), "1 polygon without indices; left out", 7),
+        (("<vcount>6 4 3", "<vcount>6 4 -3"), "1 polygon without indices; left out", 7),
+        (("<p>0 0 0", "<p>-1 0 0"), "1 polygon with fewer than 3 corners or an index below 0; left out", 4.5),
+    ],
+)
+def test_damaged_polygons_of_dae(tmp_path, change, message, expected):
+    text = dae([L, SQUARE, [(0, 0), (1, 0), (0, 1)]])
+    assert change[0] in text
+    (tmp_path / "a.dae").write_text(text.replace(*change))
+    with pytest.warns(UserWarning, match=rf"a\.dae: {message}$"):
+        mesh = load_mesh(tmp_path / "a.dae")
+    assert areas(mesh.vertices, mesh.faces)[:, 2].sum() / 2 == pytest.approx(expected)

@@ -10,8 +10,7 @@ import numpy as np
 
 from ..arrays.state import SurfaceInteraction
 from ..arrays.vec import INV_PI, TINY, Bools, Floats, broadcast, dot, f4, luminance
-from ..core.errors import flag
-from ..core.parameter import Parameter, optional, parametrized
+from ..core.parameter import Parameter, flag, optional, parametrized
 from ..sampling.warp import cosine_hemisphere, cosine_hemisphere_pdf
 from ..textures.base import BaseTexture
 from ..textures.parameter import Color, Scalar, color, refractive_index, scalar

@@ -1,6 +1,6 @@
-"""COLLADA (.dae), read by trimesh and pycollada after a check of its references.
+"""COLLADA (.dae), read by pycollada after a check of its references, and materials by trimesh.
 
-Positions are those of the file: trimesh applies neither `up_axis` nor `unit`. The scene is told what is up.
+Positions become meters by the `unit` of the file. The scene is told what is up by its `up_axis`.
 """
 
 from __future__ import annotations
@@ -8,11 +8,13 @@ from __future__ import annotations
 import re
 import zipfile
 from io import BytesIO
-from typing import Any
 
 from ..core.errors import SceneError
+from .contents import Contents
+from .dae_meshes import DaeMeshes
+from .placing import meters
 from .sources import SceneFiles
-from .trimesh_loading import Images, by_trimesh
+from .trimesh_loading import typed_errors
 from .xml_checks import check_expanded, look_through, total
 
 LOST = ("instance_controller", "instance_light", "instance_camera", "lines", "linestrips", "animation")
@@ -21,8 +23,8 @@ UP_AXIS = re.compile(rb"[^<>]*>\s*([XYZ])_UP")  # after the bytes "<" of an elem
 PLACES = ("node", "visual_scene", "scene")  # elements that hold nodes, or refer to them
 
 
-def parse(files: SceneFiles, data: bytes, materials: bool) -> tuple[Any, str]:
-    """Return the trimesh scene of a COLLADA file, and the axis that is up.
+def parse(files: SceneFiles, data: bytes, materials: bool) -> Contents:
+    """Return the meshes of a COLLADA file, in meters, and the axis that is up.
 
     Raises
     ------
@@ -34,28 +36,24 @@ def parse(files: SceneFiles, data: bytes, materials: bool) -> tuple[Any, str]:
         raise SceneError(f"{name}: is an archive; unpack it first")
     document = _Document(name, data)
     check_expanded(name, document.children, document.sizes, "scene")
-    images = Images(files)
-    found = by_trimesh(name, data, "dae", images)
-    if materials:
-        for tag, line in document.lost.items():
-            files.losses.note(tag, f"line {line}")
-        if any(map(_is_clear, found.geometry.values())):
-            files.losses.note("opacity of materials")
-        images.report()
+    for tag, line in document.lost.items() if materials else ():
+        files.losses.note(tag, f"line {line}")
+    with typed_errors(name, "dae"):
+        import collada
+
+        read = collada.Collada(BytesIO(data), ignore=[collada.common.DaeError])
+        if read.scene is None:
+            raise SceneError(f"{name}: not a readable dae file: it has no scene")
+    meshes = DaeMeshes(files, read, materials)
+    contents = meshes.contents()
     # pycollada drops damaged parts without a warning
     there = total(name, document.children, lambda node: document.primitives.get(node, 0), "scene")
-    absent = there - len(found.graph.nodes_geometry)
-    if there and absent == there:
-        raise SceneError(f"{name}: not a readable dae file: all parts of its geometry are damaged")
-    if absent > 0:
-        damaged = f"{absent} of {there} parts of its geometry"
+    if meshes.count < there:
+        damaged = f"{there - meshes.count} of {there} parts of its geometry"
         files.losses.note(damaged, value="damaged", done="left out")
-    return found, document.up
-
-
-def _is_clear(mesh: Any) -> bool:
-    color = getattr(getattr(mesh.visual, "material", None), "baseColorFactor", None)
-    return color is not None and bool(color[3] < 255)
+    contents.places.scale(meters(files.losses, "unit", read.assetInfo.unitmeter, 1.0))
+    contents.up = document.up
+    return contents
 
 
 class _Document:

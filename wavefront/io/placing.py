@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
+from typing import Any
 
 import numpy as np
 
@@ -32,6 +33,22 @@ class Places:
     def once(cls, count: int) -> Places:
         """Return the placements of meshes that are placed once each, without a transform."""
         return cls(np.arange(count), np.tile(np.eye(4), (count, 1, 1)))
+
+    def scale(self, factor: float) -> None:
+        """Multiply all lengths of the scene, as where a file has another unit than meters."""
+        with np.errstate(all="ignore"):  # a matrix that is not finite is refused where it is used
+            self.matrix = np.diag([factor] * 3 + [1.0]) @ self.matrix
+
+
+def meters(losses: Losses, name: str, unit: Any, usual: float) -> float:
+    """Return the unit of a file in meters, `usual` where it says none, or none that can be."""
+    if unit is None:
+        return usual
+    value = float(unit)
+    if not 0 < value <= MAX_ELEMENT:
+        losses.note(name, value=f"{value:g} meters", done=f"{usual:g} in its place")
+        return usual
+    return value
 
 
 def place_shapes(name: str, raws: list[RawMesh], places: Places, losses: Losses) -> list[Mesh | Instance]:

@@ -110,6 +110,38 @@ def triangulate(
     return Triangles(*map(np.concatenate, parts))
 
 
+def seamed(rings: list[Doubles]) -> Ints:
+    """Return a polygon with holes as one polygon: the order of the corners of all its rings.
+
+    A seam joins each hole to the rest at the two corners that are closest, which come twice.
+
+    Parameters
+    ----------
+    rings
+        The positions (n, 3) of the corners of the outer ring, and of each hole, which may wind either way.
+    """
+    outer, *holes = rings
+    order, points = np.arange(len(outer)), np.concatenate(rings)
+    start = len(outer)
+    for hole in holes:
+        own = np.arange(start, start + len(hole))
+        start += len(hole)
+        if len(hole) < 3:
+            continue
+        if _normal(hole) @ _normal(outer) > 0:
+            own = own[::-1]
+        apart = np.square(points[order][:, None] - points[own]).sum(2)
+        here, there = np.unravel_index(apart.argmin(), apart.shape)
+        around = np.roll(own, -int(there))
+        order = np.concatenate([order[: here + 1], around, around[:1], order[here:]])
+    return order
+
+
+def _normal(ring: Doubles) -> Doubles:
+    """Return twice the area of a polygon (n, 3) as a vector."""
+    return np.asarray(np.cross(ring, np.roll(ring, -1, 0)).sum(0))
+
+
 def _are_odd(points: Doubles, corners: Ints, counts: Ints) -> Bools:
     """Return which polygons (k,) have a triangle in their fan that is not clearly above 0."""
     odd, first = np.zeros(len(counts), np.bool_), np.cumsum(counts) - counts

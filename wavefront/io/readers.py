@@ -14,7 +14,7 @@ from ..core.files import decode_text, extension_of
 from ..core.registry import Registry
 from ..scene import Scene
 from ..shapes.smoothing import AUTO
-from . import dae, gltf, mtl, obj, off, ply, stl, threemf, trimesh_objects
+from . import dae, gltf, mtl, obj, off, ply, stl, threemf
 from .appearance import MaterialSpec, assign_material, from_srgb
 from .clouds import cloud
 from .contents import Contents
@@ -149,16 +149,11 @@ def _read_off(files: SceneFiles, data: bytes, options: LoadOptions) -> Contents:
 
 
 def _read_dae(files: SceneFiles, data: bytes, options: LoadOptions) -> Contents:
-    found, up = dae.parse(files, data, options.materials)
-    contents = trimesh_objects.read(found, files.name, files.losses)
-    contents.up = up
-    return contents
+    return dae.parse(files, data, options.materials)
 
 
 def _read_3mf(files: SceneFiles, data: bytes, options: LoadOptions) -> Contents:
-    contents = threemf.parse(files, data, options.materials)
-    contents.up = "z"
-    return contents
+    return threemf.parse(files, data, options.materials)
 
 
 def _read_mitsuba(files: SceneFiles, data: bytes, options: LoadOptions) -> Contents:

@@ -1,6 +1,7 @@
 """3MF: meshes, their colors, and where they are placed. No other archive is opened.
 
-Positions are those of the file, mostly in millimeters with z up.
+Positions become meters by the `unit` of the model, by default millimeters; z is up. What is damaged is left
+out: triangles of vertices that do not exist, and references to objects that do not.
 """
 
 from __future__ import annotations
@@ -17,12 +18,14 @@ from ..bsdfs import Diffuse
 from ..codecs.archive import checked_members, unpacked
 from ..colors import srgb
 from ..core.errors import LimitError, SceneError
+from ..core.plural import plural
 from ..materials import Material
 from ..shapes.transform import IDENTITY, Matrix
 from .appearance import MaterialSpec, assign_material
 from .contents import Contents
-from .placing import Places
-from .repair import RawMesh, Table
+from .losses import Losses
+from .placing import Places, in_range
+from .repair import RawMesh, Table, with_corners_apart
 from .sources import SceneFiles
 from .xml_checks import check_expanded, look_through
 
@@ -31,6 +34,7 @@ XML_BYTES = 4  # of memory for each byte of a member
 ROOT = "3d/3dmodel.model"  # the first member whose name contains this, in any case, is read
 LOST = ("texture2dgroup", "compositematerials", "multiproperties", "beamlattice")
 GROUPS = {"basematerials": ("base", "displaycolor"), "colorgroup": ("color", "color")}
+UNITS = {"micron": 1e-6, "millimeter": 1e-3, "centimeter": 1e-2, "inch": 0.0254, "foot": 0.3048, "meter": 1.0}
 NO_COLOR = (0.5, 0.5, 0.5)  # of triangles without one beside others that have one; linear
 
 
@@ -43,8 +47,7 @@ def parse(files: SceneFiles, data: bytes, materials: bool) -> Contents:
         If the file is malformed; the message names the file and the error.
     """
     name = files.name
-    models = _models(files, data)
-    package = _Package(name, models)
+    package = _Package(files.losses, _models(files, data))
     check_expanded(name, package.children, {}, "build")
     numbers: dict[str, int] = {}
     matrices: list[Matrix] = []
@@ -55,7 +58,9 @@ def parse(files: SceneFiles, data: bytes, materials: bool) -> Contents:
     raws = [package.raw(key, materials) for key in numbers]
     for each in package.lost if materials else ():
         files.losses.note(each)
-    return Contents(raws, Places(np.array(of, np.intp), np.array(matrices).reshape(-1, 4, 4)))
+    places = Places(np.array(of, np.intp), np.array(matrices).reshape(-1, 4, 4))
+    places.scale(package.unit)
+    return Contents(raws, places, up="z")
 
 
 def _models(files: SceneFiles, data: bytes) -> dict[str, bytearray]:
@@ -102,8 +107,9 @@ class _Object:
 class _Package:
     """The objects of a package, by the member that holds them and their id."""
 
-    def __init__(self, name: str, models: dict[str, bytearray]) -> None:
-        self._name = name
+    def __init__(self, losses: Losses, models: dict[str, bytearray]) -> None:
+        self.losses = losses
+        self.unit = UNITS["millimeter"]  # meters; that of the first model
         self._members = {member.lower().strip("/"): member for member in models}
         self._objects: dict[str, _Object] = {}
         self._items: list[tuple[str, Matrix]] = []
@@ -113,10 +119,8 @@ class _Package:
         for member, content in models.items():
             _Model(self, member, member == root).read(content)
         for key, each in self._objects.items():
-            for child, _ in each.components:
-                self._find(child, key)
-        for child, _ in self._items:
-            self._find(child, "build")
+            each.components = [part for part in each.components if self._exists(part[0], key)]
+        self._items = [item for item in self._items if self._exists(item[0], "build")]
 
     @property
     def children(self) -> dict[str, list[str]]:
@@ -127,9 +131,8 @@ class _Package:
     def key(self, member: str, attributes: dict[str, str]) -> str:
         """Return the key of the object that an element of a member refers to."""
         path = attributes.get("path", "").strip("/")
-        if path and path.lower() not in self._members:
-            raise SceneError(f"{self._name}: refers to {path!r}, which is no model of the package")
-        return f"{self._members[path.lower()] if path else member}#{attributes.get('objectid', '')}"
+        found = self._members.get(path.lower(), path) if path else member
+        return f"{found}#{attributes.get('objectid', '')}"
 
     def placed(self) -> list[tuple[str, Matrix]]:
         """Return the meshes that are built, with their matrices to the scene."""
@@ -139,6 +142,11 @@ class _Package:
             while waiting:
                 key, matrix = waiting.pop()
                 each = self._objects[key]
+                if not in_range(matrix[None]).all():
+                    self.losses.note(
+                        f"the matrix of object {key}", value="beyond all limits", done="left out"
+                    )
+                    continue
                 if each.corners:
                     out.append((key, matrix))
                 waiting += [(child, matrix @ inner) for child, inner in reversed(each.components)]
@@ -147,9 +155,14 @@ class _Package:
     def raw(self, key: str, materials: bool) -> RawMesh:
         """Return the mesh of an object; corners of several colors become vertices of their own."""
         each = self._objects[key]
-        raw = RawMesh(
-            each.name, np.array(each.vertices).reshape(-1, 3), np.array(each.corners, np.intp).reshape(-1, 3)
-        )
+        vertices, corners = np.array(each.vertices).reshape(-1, 3), np.array(each.corners, np.intp)
+        faces = corners.reshape(-1, 3)
+        sound = ((faces >= 0) & (faces < len(vertices))).all(1)
+        raw = RawMesh(each.name, vertices, faces[sound])
+        if not sound.all():
+            lost = plural(int((~sound).sum()), "triangle")
+            what = f"{lost} with a vertex beyond the {len(vertices)}, first: triangle {sound.argmin()}"
+            self.losses.note(what, f"object {key}", done="left out")
         member = key.partition("#")[0]
         if not materials or not (each.paint or each.color):
             return raw
@@ -158,37 +171,41 @@ class _Package:
         if not each.paint:
             assign_material(raw, MaterialSpec(Material(Diffuse(own))))
             return raw
-        colors = np.tile(own, (len(raw.faces), 3, 1))
+        colors = np.tile(own, (len(faces), 3, 1))
         paint = np.array(each.paint).reshape(-1, 5)
         for group, number in each.groups.items():
             rows = paint[paint[:, 1] == number]
             colors[rows[:, 0]] = self._colors(member, group, rows[:, 2:])
-        used = raw.faces.ravel()
-        if used.size and (used.min() < 0 or used.max() >= len(raw.vertices)):
-            return raw  # which is refused where it is built
-        raw.vertices, raw.faces = raw.vertices[used], np.arange(used.size).reshape(-1, 3)
-        raw.colors = np.column_stack([colors.reshape(-1, 3), np.ones(used.size)])
+        raw = with_corners_apart(raw)
+        raw.colors = np.column_stack([colors[sound].reshape(-1, 3), np.ones(raw.faces.size)])
         assign_material(raw, None)
         return raw
 
-    def _find(self, key: str, parent: str) -> None:
+    def _exists(self, key: str, parent: str) -> bool:
         if key not in self._objects:
-            raise SceneError(f"{self._name}: {parent} refers to object {key}, which does not exist")
+            self.losses.note(f"{parent} refers to object {key}, which does not exist", done="left out")
+        return key in self._objects
 
     def _colors(self, member: str, group: str, numbers: Ints) -> Table:
-        """Return the linear colors (..., 3) of numbers (...,) of a group; `NO_COLOR` if it holds none."""
+        """Return the linear colors (..., 3) of numbers (...,) of a group; `NO_COLOR` where it has none."""
         codes = self._groups.get(f"{member}#{group}")
         if codes is None:
             return np.broadcast_to(NO_COLOR, (*numbers.shape, 3))
-        bad = numbers[(numbers < 0) | (numbers >= len(codes))]
-        if bad.size:
-            raise SceneError(f"{self._name}: group {group} has {len(codes)} colors, not number {bad.flat[0]}")
         if any(len(code) == 9 and code[7:].lower() != "ff" for code in codes):
             self.lost["opacity of colors"] = None
+        table = np.array([*(self._color(group, code) for code in codes), NO_COLOR])
+        bad = (numbers < 0) | (numbers >= len(codes))
+        if bad.any():
+            what = f"group {group} has {len(codes)} colors, not number {numbers[bad].flat[0]}"
+            self.losses.note(what, done="gray in its place")
+        return table[np.where(bad, len(codes), numbers)]
+
+    def _color(self, group: str, code: str) -> Table:
         try:
-            return srgb([code[:7] for code in codes]).astype(np.float64)[numbers]
-        except SceneError as error:
-            raise SceneError(f"{self._name}: group {group}: {error}") from None
+            return srgb(code[:7]).astype(np.float64)
+        except SceneError:
+            self.losses.note(f"group {group} has {code[:20]!r}, which is no color", done="gray in its place")
+            return np.array(NO_COLOR)
 
 
 class _Model:
@@ -212,6 +229,8 @@ class _Model:
         def begin(tag: str, attributes: dict[str, str], at: int) -> None:
             if tag in begins:
                 begins[tag](attributes)
+            elif tag == "model" and self._root:
+                self._unit(attributes.get("unit", "millimeter"))
             elif tag in GROUPS:
                 self._group = self._package._groups.setdefault(self._key(attributes.get("id", "")), [])
             elif self._group is not None and tag in ("base", "color"):
@@ -220,20 +239,28 @@ class _Model:
                 self._package.lost[tag] = None
                 self._group = None
 
-        look_through(f"{self._package._name}: {self._member}", content, begin)
+        look_through(f"{self._package.losses.name}: {self._member}", content, begin)
+
+    def _unit(self, unit: str) -> None:
+        if unit not in UNITS:
+            self._note("unit", repr(unit[:40]), "millimeter in its place")
+        self._package.unit = UNITS.get(unit, UNITS["millimeter"])
+
+    def _note(self, part: str, value: str, done: str) -> None:
+        self._package.losses.note(part, self._member, value, done)
 
     def _key(self, identity: str) -> str:
         return f"{self._member}#{identity}"
 
     def _begin_object(self, attributes: dict[str, str]) -> None:
         pid = attributes.get("pid")
-        color = None if pid is None else (pid, int(self._number(attributes, "pindex", int, "0")))
+        color = None if pid is None else (pid, self._whole(attributes, "pindex", 0))
         self._object = _Object(attributes.get("name", ""), color)
         self._package._objects[self._key(attributes.get("id", ""))] = self._object
 
     def _vertex(self, attributes: dict[str, str]) -> None:
         if self._object is not None:
-            self._object.vertices.extend(self._number(attributes, axis, float) for axis in "xyz")
+            self._object.vertices.extend(self._number(attributes, axis) for axis in "xyz")
 
     def _triangle(self, attributes: dict[str, str]) -> None:
         each = self._object
@@ -242,10 +269,10 @@ class _Model:
         if "p1" in attributes:
             pid = attributes.get("pid", "" if each.color is None else each.color[0])
             group = each.groups.setdefault(pid, len(each.groups))
-            first = attributes["p1"]
-            numbers = [int(self._number(attributes, name, int, first)) for name in ("p1", "p2", "p3")]
+            first = self._whole(attributes, "p1", -1)
+            numbers = [first, *(self._whole(attributes, name, first) for name in ("p2", "p3"))]
             each.paint.extend((len(each.corners) // 3, group, *numbers))
-        each.corners.extend(int(self._number(attributes, name, int)) for name in ("v1", "v2", "v3"))
+        each.corners.extend(self._whole(attributes, name) for name in ("v1", "v2", "v3"))
 
     def _component(self, attributes: dict[str, str]) -> None:
         if self._object is not None:
@@ -258,21 +285,25 @@ class _Model:
                 (self._package.key(self._member, attributes), self._matrix(attributes))
             )
 
-    def _number(
-        self, attributes: dict[str, str], name: str, kind: type[int] | type[float], usual: str | None = None
-    ) -> float:
-        text = attributes.get(name, usual)
+    def _number(self, attributes: dict[str, str], name: str) -> float:
+        """Return a number of an element; NaN, which is noted, where it has none."""
         try:
-            if text is None:
-                raise ValueError
-            value = kind(text)
-            if kind is int and not abs(value) < 2**62:
-                raise ValueError
-        except ValueError:
-            found = "is missing" if text is None else f"is {text[:40]!r}"
-            raise SceneError(
-                f"{self._package._name}: {self._member}: {name} {found}; it must be a number"
-            ) from None
+            return float(attributes[name])
+        except (KeyError, ValueError):
+            return float(self._missing(attributes, name, np.nan))
+
+    def _whole(self, attributes: dict[str, str], name: str, usual: int | None = None) -> int:
+        """Return a whole number of an element; one that none has, which is noted, where it is damaged."""
+        if usual is not None and name not in attributes:
+            return usual
+        try:
+            value = int(attributes[name])
+            return value if abs(value) < 2**62 else -1
+        except (KeyError, ValueError):
+            return int(self._missing(attributes, name, -1))
+
+    def _missing(self, attributes: dict[str, str], name: str, value: float) -> float:
+        self._note(name, repr(attributes[name][:40]) if name in attributes else "missing", "left out")
         return value
 
     def _matrix(self, attributes: dict[str, str]) -> Matrix:
@@ -280,12 +311,11 @@ class _Model:
         text = attributes.get("transform")
         if text is None:
             return IDENTITY
-        words = text.split()
-        if len(words) != 12:
-            raise SceneError(
-                f"{self._package._name}: {self._member}: transform has {len(words)} numbers; it must have 12"
-            )
-        rows = np.array([self._number({"transform": word}, "transform", float) for word in words])
+        try:
+            rows = np.array([float(word) for word in text.split()]).reshape(4, 3)
+        except ValueError:
+            self._note("transform", repr(text[:40]), "left out, as it must be 12 numbers")
+            return IDENTITY
         matrix = IDENTITY.copy()
-        matrix[:3] = rows.reshape(4, 3).T
+        matrix[:3] = rows.T
         return matrix

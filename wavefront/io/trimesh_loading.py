@@ -56,35 +56,6 @@ def _as_png(codes: NDArray[Any]) -> bytes:
     return out.getvalue()
 
 
-def by_trimesh(name: str, data: bytes, kind: str, images: Any = None, skip_materials: bool = False) -> Any:
-    """Return the trimesh scene of a file, with nothing merged or dropped.
-
-    Parameters
-    ----------
-    name
-        File name, for messages.
-    data
-        The file.
-    kind
-        Its extension, without the dot.
-    images
-        The resolver by which trimesh reads other files.
-    skip_materials
-        The argument of that name of trimesh's loaders that have it.
-
-    Raises
-    ------
-    SceneError
-        For any error of trimesh but MemoryError.
-    """
-    trimesh = import_trimesh()
-    options: dict[str, Any] = {"skip_materials": True} if skip_materials else {}
-    with typed_errors(name, kind):
-        if kind == "dae":
-            return _unprocessed(trimesh.exchange.dae.load_collada(BytesIO(data), images))
-        return trimesh.load_scene(BytesIO(data), file_type=kind, process=False, resolver=images, **options)
-
-
 def geometries(name: str, kind: str, data: bytes) -> list[dict[str, Any]]:
     """Return the meshes that trimesh's loader reads; a trimesh object would round their colors to 8 bits.
 
@@ -109,15 +80,3 @@ def typed_errors(name: str, kind: str) -> Iterator[None]:
         raise
     except Exception as error:
         raise SceneError(f"{name}: not a readable {kind} file: {error!r}") from error
-
-
-def _unprocessed(loaded: dict[str, Any]) -> Any:
-    """Build the scene that trimesh's loader of COLLADA describes; `load_scene` would merge its vertices."""
-    trimesh = import_trimesh()
-    scene = trimesh.Scene()
-    scene.geometry.update(
-        {key: trimesh.Trimesh(**mesh, process=False) for key, mesh in loaded["geometry"].items()}
-    )
-    for node in loaded["graph"]:
-        scene.graph.update(**node)
-    return scene

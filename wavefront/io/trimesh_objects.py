@@ -122,13 +122,12 @@ class _Visuals:
         if material is None or _is_blank(material):
             return None
         if id(material) not in self._specs:
-            where = f"trimesh material {material.name!r}"
-            self._specs[id(material)] = _material_spec(material, where, bare, self._losses)
+            self._specs[id(material)] = material_spec(material, self._losses, bare)
         return self._specs[id(material)]
 
 
-def _material_spec(material: Any, where: str, bare: bool, losses: Losses) -> MaterialSpec:
-    """Return the material of a trimesh `PBRMaterial` or `SimpleMaterial`; `where` is for messages.
+def material_spec(material: Any, losses: Losses, bare: bool = False) -> MaterialSpec:
+    """Return the material of a trimesh `PBRMaterial` or `SimpleMaterial`.
 
     If `bare`, the colors and the exponent of the highlight count only if the material has its own `Kd`, `Ks`
     or `Ns`. Otherwise those that trimesh would write into a file count.
@@ -136,7 +135,7 @@ def _material_spec(material: Any, where: str, bare: bool, losses: Losses) -> Mat
     if hasattr(material, "baseColorFactor"):
         found = _pbr(material)
     elif hasattr(material, "diffuse"):
-        found = _simple(material, where, bare, losses)
+        found = _simple(material, f"trimesh material {material.name!r}", bare, losses)
     else:
         found = MaterialSpec(Material(Diffuse(MATTE)), lost=[type(material).__name__])
     name = getattr(material, "name", None)

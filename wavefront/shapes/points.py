@@ -10,10 +10,9 @@ from numpy.typing import ArrayLike
 
 from ..arrays.vec import Doubles
 from ..colors import srgb
-from ..core.errors import SceneError, as_array, called, finite_array, warn_caller
+from ..core.errors import SceneError, as_array, finite_array, warn_caller
 from ..core.suggestions import suggests_keywords
 from ..materials import MaterialLike
-from .arrays import checked_radii
 from .mesh import Mesh, positions
 from .segments import Capsules
 from .spheres import Spheres
@@ -57,15 +56,11 @@ def Points(
     """
     places, given = cloud_arrays(points)
     colors = given if colors is None else colors
-    places = positions(f"{name}: points", places)
-    if not len(places):
-        raise SceneError(f"{name}: points is empty; it must have at least one row")
+    places = positions(f"{name}: centers", places)
     if radius is None:
         radius = usual_radius(places)
         warn_caller(f"{name}: {len(places)} points are shown as spheres of radius {radius:.3g}")
-    radii = checked_radii(f"{name}: radius", radius)
-    with called(f"{name}: radius", f"{name}: radii"):
-        return Spheres(places, radii, colors, material=material, name=name)
+    return Spheres(places, radius, colors, material=material, name=name)
 
 
 @suggests_keywords
@@ -96,10 +91,8 @@ def Edges(
     """
     starts, ends = _ends_of_mesh(lines) if hasattr(lines, "faces") else _ends_of_lines(name, lines)
     if not len(starts):
-        raise SceneError(f"{name}: lines has no edges")
-    radii = checked_radii(f"{name}: radius", radius)
-    with called(f"{name}: radius", f"{name}: radii"):
-        return Capsules(starts, ends, radii, material=material, name=name)
+        raise SceneError(f"{name}: has no edges")
+    return Capsules(starts, ends, radius, material=material, name=name)
 
 
 def cloud_arrays(points: Any) -> tuple[Any, Any]:

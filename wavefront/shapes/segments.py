@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike
 from ..arrays.elementary import sin_cos_turns
 from ..arrays.frame import Frame
 from ..arrays.vec import Doubles
-from ..core.errors import SceneError, flag
+from ..core.errors import SceneError
 from ..core.plural import plural
 from ..core.suggestions import suggests_keywords
 from ..materials import MaterialLike
@@ -140,7 +140,7 @@ class Cylinders(SegmentArray):
         material: MaterialLike | None = None,
         name: str = "cylinders",
     ) -> None:
-        self.caps = flag(f"{name}: caps", caps)
+        self.caps = bool(caps)
         super().__init__(starts, ends, radii, colors, material, name)
 
     def _reach(self) -> Doubles:
