@@ -5,6 +5,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from gltf_builder import Builder
 
 import wavefront as wf
 from wavefront.arrays.vec import f4
@@ -296,3 +297,29 @@ def test_a_year_in_lux() -> None:
     value, error = found.lux(wf.Sky.cie(5, horizontal=90))
     assert value == pytest.approx(110 * 90, rel=0.02)
     assert error[0] < 0.02 * value[0]
+
+
+def test_lights_of_gltf_have_the_candela_of_their_file(tmp_path) -> None:
+    """A point light of 90 cd at a height of 3, and a triangle of 5 cd/m² on the floor seen from above."""
+    build = Builder().mesh(material=0)
+    build.json["materials"] = [
+        {
+            "emissiveFactor": [1, 1, 1],
+            "doubleSided": True,
+            "extensions": {"KHR_materials_emissive_strength": {"emissiveStrength": 5}},
+        }
+    ]
+    light = {"type": "point", "intensity": 90}
+    build.json["extensionsUsed"] = ["KHR_lights_punctual", "KHR_materials_emissive_strength"]
+    build.json["extensions"] = {"KHR_lights_punctual": {"lights": [light]}}
+    build.json["nodes"] += [{"translation": [0, 3, 9], "extensions": {"KHR_lights_punctual": {"light": 0}}}]
+    build.json["scenes"] = [{"nodes": [0, 1]}]
+    build.glb(tmp_path / "a.glb")
+    below = wf.measure(tmp_path / "a.glb", [(0, 0, 9)], UP, spp=1024, max_bounces=0, **QUIET)
+    assert abs(below.lux - 10) < 4 * below.lux_error + 0.01 < 0.4
+    emitted = {"kind": "radiance", "spp": 4, "max_bounces": 0, **QUIET}
+    alone = wf.load(tmp_path / "a.glb")
+    under_sky = wf.Scene(alone.shapes, [wf.Sky.cie(5, horizontal=1)])
+    for scene in (alone, under_sky):
+        seen = wf.measure(scene, [(0.2, 0.2, 1)], (0, 0, -1), **emitted)
+        assert seen.lux == pytest.approx(5)

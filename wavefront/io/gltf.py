@@ -15,7 +15,7 @@ from ..camera import Camera
 from ..core.errors import LimitError, SceneError, exact, printable
 from ..lights import DirectionalLight, PointLight, SpotLight
 from ..shapes.transform import IDENTITY, Matrix
-from .gltf_document import Document, floats, shown
+from .gltf_document import OF_CANDELA, Document, floats, shown
 from .gltf_meshes import Primitive, primitives
 from .gltf_nodes import INSTANCING, Node, count_placements, placements, walk
 from .gltf_posing import Skin, held, pose, read_skin, target_weights
@@ -237,7 +237,7 @@ def _positive(lens: dict[str, Any], key: str, default: float | None) -> float:
 
 
 def _add_light(document: Document, out: GltfContents, index: Any, matrix: Matrix) -> None:
-    """Add a light of KHR_lights_punctual; candela count as W/sr."""
+    """Add a light of KHR_lights_punctual; candela count as W/sr, of 1 lm/W."""
     lights = document.json.get("extensions", {}).get("KHR_lights_punctual", {}).get("lights", [])
     if not isinstance(index, int) or not 0 <= index < len(lights):
         raise SceneError(f"light {shown(index)} does not exist; there are {len(lights)}")
@@ -249,6 +249,7 @@ def _add_light(document: Document, out: GltfContents, index: Any, matrix: Matrix
         if found is None:
             document.lose(f"{light.get('type')} light", f"light {index}")
         else:
+            found.efficacy = OF_CANDELA
             out.lights.append(found)
 
 

@@ -40,6 +40,7 @@ MAX_NUMBERS = 2**29  # in all accessors that are read, as several meshes may sha
 NUMBER_BYTES = 20  # of memory for each number that is read, until a mesh is made of it
 MAX_COUNT = 2**53  # of bytes or elements: all JSON readers represent whole numbers up to here exactly
 LARGEST = float(np.finfo(np.float64).max)
+OF_CANDELA = 1.0  # lm/W of light that a file gives in candela, lux or cd/m²
 SHOWN = 80  # characters of a value in a message
 # errors of reading JSON of the wrong structure: a list in place of a number, text in place of a list
 MALFORMED = (TypeError, KeyError, AttributeError, IndexError, ValueError, OverflowError)

@@ -19,7 +19,7 @@ from ..textures.parameter import MAX_INDEX
 from .appearance import MaterialSpec, build_material
 from .gltf_anisotropy import Direction, RoughnessAlong
 from .gltf_compression import DRACO, MESHOPT
-from .gltf_document import SHOWN, Document, floats, shown
+from .gltf_document import OF_CANDELA, SHOWN, Document, floats, shown
 from .gltf_nodes import INSTANCING
 from .gltf_specular_glossiness import F0, BesideSpecular
 from .sources import GRAY
@@ -174,6 +174,8 @@ class _Reader:
             self._extended(extensions)
         radiance = self._emission(extensions.get("KHR_materials_emissive_strength", {}))
         material, lost = build_material(self._wanted, normal_map)
+        if radiance is not None:
+            material.efficacy = OF_CANDELA
         material.name = printable(str(self._item["name"])) if self._item.get("name") else None
         both = bool(self._item.get("doubleSided"))
         return MaterialSpec(material, radiance, both, self._lost + lost, self._alpha_given, self._cutoff)
