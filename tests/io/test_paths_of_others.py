@@ -28,6 +28,7 @@ NAMES = [  # of textures/tex.png, or of tex.png
     "somewhere/else/tex.png",
     "TEX.PNG",
     "C:/Users/A%20B/te%78.png",
+    "'C:/Users/someone/tex.png'",
 ]
 
 

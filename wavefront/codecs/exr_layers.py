@@ -26,6 +26,7 @@ PICTURES = (
     "color",
     "image",
     "c",
+    "ci",
     "main",
 )  # names of layers
 WORDS = {"red": "R", "green": "G", "blue": "B", "alpha": "A"}

@@ -101,8 +101,8 @@ def codes_of(image: Image) -> NDArray[Any]:
         If it has a mode that cannot be shown, such as whole numbers of 32 bits.
     """
     mode = image.mode
-    if mode.startswith("I;16"):
-        return np.asarray(image).astype(np.uint16)[..., None]
+    if mode.startswith("I"):  # 16 bits, also where Pillow has them in 32
+        return np.clip(np.asarray(image), 0, 65535).astype(np.uint16)[..., None]
     if mode not in AS_STORED:
         image = image.convert(_target(image))
     elif mode in ("L", "RGB") and "transparency" in image.info:

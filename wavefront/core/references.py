@@ -5,7 +5,9 @@ from __future__ import annotations
 import os
 import re
 from collections.abc import Iterator, Sequence
+from contextlib import suppress
 from pathlib import Path
+from typing import TypeAlias
 from urllib.parse import unquote
 
 from .errors import SceneError
@@ -61,8 +63,15 @@ def followed(
     return allowed
 
 
+Listed: TypeAlias = dict[Path, dict[str, str]]  # names in folders, by the same names without their case
+
+
 def elsewhere(
-    source: str | os.PathLike[str], reference: str, places: Sequence[Path], roots: Sequence[Path]
+    source: str | os.PathLike[str],
+    reference: str,
+    places: Sequence[Path],
+    roots: Sequence[Path],
+    listed: Listed,
 ) -> Path | None:
     """Return a file that a path of another machine may mean: its last parts, in one of some folders.
 
@@ -73,6 +82,8 @@ def elsewhere(
     ----------
     source, reference, places, roots
         As of `followed`, whose rules hold for what is found.
+    listed
+        The folders that were looked through before; those that are now are added.
 
     Returns
     -------
@@ -82,15 +93,16 @@ def elsewhere(
     for exact in (True, False):
         for name in _names(reference):
             for place in places:
-                found = place / name if exact else _in_any_case(place, name)
-                if found is not None and os.path.exists(found) and _is_followed(source, found, place, roots):
-                    return found
+                there = name if exact else _in_any_case(place, name, roots, listed)
+                if there is not None and os.path.exists(place / there):
+                    with suppress(SceneError):
+                        return followed(source, there, [place], roots)[0]
     return None
 
 
 def _names(reference: str) -> Iterator[str]:
     """Yield the last parts of a path, the longest first, as they are and as those of a URI."""
-    path = reference.replace("\\", "/")
+    path = reference.replace("\\", "/").strip("\"' ")
     if "://" in path or path.lower().startswith(SCHEMES):
         path = re.split("[?#]", path)[0]
     for text in dict.fromkeys((path, unquote(path))):
@@ -100,23 +112,23 @@ def _names(reference: str) -> Iterator[str]:
             yield "/".join(parts[start:])
 
 
-def _in_any_case(folder: Path, name: str) -> Path | None:
-    """Return the file in a folder whose name, or the folders on the way to it, differ in case alone."""
-    found = folder
+def _in_any_case(folder: Path, name: str, roots: Sequence[Path], listed: Listed) -> str | None:
+    """Return a name as files in a folder have it, whose case may differ."""
+    found, here = [], folder
     for part in name.split("/"):
-        try:
-            there = sorted(os.listdir(found))
-        except OSError:
-            return None
-        alike = next((each for each in there if each.casefold() == part.casefold()), None)
+        if here not in listed:
+            inside = any(here.resolve().is_relative_to(root) for root in roots)
+            listed[here] = {each.casefold(): each for each in _names_in(here)} if inside else {}
+        alike = listed[here].get(part.casefold())
         if alike is None:
             return None
-        found = found / alike
-    return found
+        found.append(alike)
+        here = here / alike
+    return "/".join(found)
 
 
-def _is_followed(source: str | os.PathLike[str], path: Path, place: Path, roots: Sequence[Path]) -> bool:
+def _names_in(folder: Path) -> list[str]:
     try:
-        return path in followed(source, os.fspath(path.relative_to(place)), [place], roots)
-    except SceneError:
-        return False
+        return sorted(os.listdir(folder), reverse=True)  # of several alike the first one counts
+    except OSError:
+        return []

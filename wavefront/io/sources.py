@@ -20,7 +20,7 @@ from ..codecs.budget import MEMORY_BYTES, Budget
 from ..codecs.images import decode_codes, read_codes
 from ..core.errors import LimitError, SceneError, passed_limit
 from ..core.files import MAX_BYTES, MAX_PIXELS, check_regular, path_name, read_bytes
-from ..core.references import GZIPPED, elsewhere, followed
+from ..core.references import GZIPPED, Listed, elsewhere, followed
 from ..textures.image import StoredImage, checked
 from .losses import Losses
 
@@ -129,6 +129,7 @@ class SceneFiles:
     losses: Losses = None  # type: ignore[assignment]  # of the load; by default of these files alone
     budget: Budget = field(init=False)  # of all these files together
     _images: dict[Path, NDArray[Any]] = field(init=False, default_factory=dict)
+    _listed: Listed = field(init=False, default_factory=dict)  # of folders where files were looked for
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "budget", Budget(self.limits.pixels, self.limits.memory_bytes))
@@ -176,7 +177,7 @@ class SceneFiles:
         except SceneError as error:
             allowed, refused = [], error
         found = next((path for path in allowed if os.path.exists(path)), None)
-        if found is None and (found := elsewhere(source, reference, places, roots)) is not None:
+        if found is None and (found := elsewhere(source, reference, places, roots, self._listed)) is not None:
             self._note_found(reference, source, found)
         if found is not None:
             check_regular(found, self.limits.file_bytes)
@@ -257,6 +258,7 @@ class SceneFiles:
         """Return the files that a file of the scene may read; budget and losses are those of the scene."""
         files = SceneFiles(path, self.search_paths, self.limits, self.losses)
         object.__setattr__(files, "budget", self.budget)
+        object.__setattr__(files, "_listed", self._listed)
         return files
 
     def read(self, path: PathLike) -> bytes:
