@@ -2,6 +2,7 @@
 
 import io
 import struct
+import zipfile
 import zlib
 
 import numpy as np
@@ -9,7 +10,7 @@ import pytest
 from PIL import Image as Pil
 
 import wavefront as wf
-from wavefront.codecs import hdr
+from wavefront.codecs import hdr, npz
 from wavefront.codecs.budget import Budget
 from wavefront.codecs.images import decode_codes
 from wavefront.colors.primaries import REC_709, rgb_to_xyz, to_srgb
@@ -249,6 +250,16 @@ def test_small_files_that_claim_large_pictures_are_refused_before_they_are_decod
     for data, name in ((tga, "a.tga"), (gif, "a.gif"), (webp, "a.webp"), (lossless, "a.webp")):
         with pytest.raises(wf.SceneError, match=r"pixels.*limit of 178956970|pixels; the limit is 134217728"):
             decoded(data, name)
+
+
+def test_the_size_of_a_webp_is_checked_before_the_library_takes_memory_for_it(fails):
+    small = [encoded(Pil.new("RGB", (40, 30)), "WEBP", lossless=lossless) for lossless in (True, False)]
+    small.append(encoded(Pil.new("RGBA", (40, 30), (9, 9, 9, 99)), "WEBP"))
+    assert {data[12:16] for data in small} == {b"VP8 ", b"VP8L", b"VP8X"}
+    fails("PIL.Image.open", AssertionError("is opened"))
+    for data in small:
+        with pytest.raises(wf.SceneError, match="image has 40 × 30 pixels; the limit is 1199"):
+            decode_codes(data, "a.webp", Budget(pixels=1199))
 
 
 def test_modes_that_are_not_read_are_named():
@@ -630,6 +641,27 @@ def test_orders_of_hdr(order):
 
 
 # --- Arrays of NumPy ----------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    "header",
+    [
+        b"{'descr': '<f4', 'fortran_order': False, 'shape': (2, 2, 2 ",
+        b"{'descr': '<f4', 'fortran_order': False, 'shape': (2, 2, 2)",
+        b'"""',
+        b"{'descr': '" + b"(" * 200,
+    ],
+)
+def test_headers_that_are_no_python(header):
+    """NumPy's parser raises errors of its tokenizer."""
+    data = b"\x93NUMPY\x01\x00" + struct.pack("<H", len(header) + 11) + header + b" " * 10 + b"\n" + bytes(32)
+    with pytest.raises(wf.SceneError, match="not a readable npy file"):
+        npz.read_array(data, Budget())
+    out = io.BytesIO()
+    with zipfile.ZipFile(out, "w") as archive:
+        archive.writestr("a.npy", data)
+    with pytest.raises(wf.SceneError, match="not a readable npz file"):
+        npz.read_arrays(out.getvalue(), Budget())
 
 
 def test_damaged_arrays_are_typed_errors(tmp_path):
