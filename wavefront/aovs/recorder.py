@@ -18,13 +18,14 @@ from ..colors import EFFICACY
 from ..compile.light_groups import PATCHED, LightGroups
 from ..compile.scene import CompiledScene
 from ..core.errors import SceneError
-from ..film.aov_names import AOVS, CLAMPED, KEYED_AOVS, LUX
+from ..film.aov_names import AOVS, CLAMPED, KEYED_AOVS, LUX, NARROW
 from ..film.aov_samples import BOUNDED, AovSamples, FixedPointSamples, fixed_point
 from ..stages.compact import compact
 from ..stages.interaction import interaction
 from ..stages.normal_mapping import perturb_normals
 from ..stages.shade import Shading, shading
 from .lux import lux_of
+from .narrow_lobes import NarrowLobes
 from .path_recorder import MetSurfaces, PathRecorder
 
 FEATURES = ("denoising_albedo", "denoising_normal")
@@ -63,6 +64,7 @@ class SampleRecorder(PathRecorder):
         self._wanted, self._scene = tuple(wanted), scene
         self._values = {name: np.zeros((AOVS[name].channels, n), f4) for name in BOUNDED if name in wanted}
         self._coverage = Coverage(scene, n) if "coverage" in wanted else None
+        self._narrow = NarrowLobes(n) if NARROW in wanted else None
         self._light: dict[str, Floats] = {}
         if "direct" in wanted or "indirect" in wanted:
             self._light["direct"] = np.zeros((3, n), f4)
@@ -88,6 +90,8 @@ class SampleRecorder(PathRecorder):
         if self._wanted == (LUX,) and not self._divided:
             return
         paths.recorder = self
+        if self._narrow is not None:
+            self._narrow.begin(paths)
         if "direct" in self._light or CLAMPED in self._light:
             paths.depth = broadcast(np.uint8(BounceDepth.CAMERA), len(paths))
         if any(name in self._values for name in FEATURES):
@@ -99,17 +103,21 @@ class SampleRecorder(PathRecorder):
 
     def of_shared(self, count: int) -> SampleRecorder | None:
         """Return what divides the light of so many shared points among the groups of lights."""
-        if self._divided:
-            wanted = [name for name in BY_LIGHT if name in self._wanted]
+        wanted = [name for name in BY_LIGHT if name in self._wanted and self._divided]
+        wanted += [NARROW] if self._narrow is not None else []
+        if wanted:
             self._shared = SampleRecorder(wanted, self._scene, count)
         return self._shared
 
     def parts_of_shared(self) -> list[tuple[Floats, Floats]]:
-        """Return the light of each group, of the samples and of the shared points."""
+        """Return the light of each group, of the samples and of the shared points; and narrow lobes alike."""
         if self._shared is None:
             return []
-        parts = zip(self._divided, self._shared._divided, strict=True)
-        return [pair for one, shared in parts for pair in zip(one.light, shared.light, strict=True)]
+        divided = zip(self._divided, self._shared._divided, strict=True)
+        parts = [pair for one, shared in divided for pair in zip(one.light, shared.light, strict=True)]
+        if self._narrow is not None and self._shared._narrow is not None:
+            parts.append((self._narrow.throughput, self._shared._narrow.throughput))
+        return parts
 
     # --- Surfaces -------------------------------------------------------------------------------------
 
@@ -117,6 +125,8 @@ class SampleRecorder(PathRecorder):
         """Record what paths meet next; see `PathRecorder`."""
         self._shade_awaited()
         (paths, hits), first, self._begun = (met.paths, met.hits), not self._begun, True
+        if self._narrow is not None:
+            self._narrow.record(paths)
         if first and "alpha" in self._values:
             self._values["alpha"][:, paths.slot] = _opacity(paths, hits)
         if first and self._coverage is not None:
@@ -277,7 +287,8 @@ class SampleRecorder(PathRecorder):
         counts: dict[str, Ints] = {}
         if self._coverage is not None:
             counts.update(self._coverage.counts(samples, dropped))
-        return AovSamples(counts, self._bounded(samples, dropped), light)
+        narrow = None if self._narrow is None else self._narrow.result(samples, dropped)
+        return AovSamples(counts, self._bounded(samples, dropped), light, narrow)
 
     def _bounded(self, samples: int, dropped: Ints) -> dict[str, FixedPointSamples]:
         """Return the AOVs with values in [-1, 1]."""
@@ -298,7 +309,7 @@ class SampleRecorder(PathRecorder):
                     f"the integrator {label} cannot give the AOV {name!r}: all light must be added by "
                     "wavefront.integrators.accumulate to the array that it returns"
                 )
-            if name not in (*OF_LIGHT, LUX) and not self._begun:
+            if name not in (*OF_LIGHT, LUX, NARROW) and not self._begun:
                 raise SceneError(
                     f"the integrator {label} cannot give the AOV {name!r}: its paths must find their "
                     "surfaces by wavefront.integrators.intersect_and_compact"

@@ -64,6 +64,14 @@ MEASURED_AOVS: dict[str, Aov] = {  # AOVs that measurements have, whose errors c
 }
 # what follows the name of such an AOV in those of its error, and the variance of a sample (Image.measured)
 STANDARD_ERROR, VARIANCE = "_error", "_variance"
+NARROW = "narrow_lobes"
+# in the metadata of sensors: radiance of the brightest emitter, and how many lux that is at most
+BRIGHTEST, BRIGHTEST_LUX = "brightest", "brightest_lux"
+SENSOR_AOVS: dict[str, Aov] = {  # AOVs of sensors, which nobody asks for
+    NARROW: _sampled(
+        1, "Σp²/Σp of the samples' greatest throughputs p after narrow lobes (docs/measuring.md)"
+    ),
+}
 BOXES = "boxes"  # of objects: no array, but `Image.boxes`
 ALL_AOVS = "all"  # stands for all of `AOVS`, and for nothing else
 
@@ -95,7 +103,7 @@ def geometric_names(chosen: Iterable[str]) -> tuple[str, ...]:
 
 def aov_of(name: str) -> Aov:
     """Return an AOV by its name, that of an AOV with a key such as "light_groups.sun"."""
-    return {**AOVS, **KEYED_AOVS, **GIVEN_AOVS, **MEASURED_AOVS}[name.partition(".")[0]]
+    return {**AOVS, **KEYED_AOVS, **GIVEN_AOVS, **MEASURED_AOVS, **SENSOR_AOVS}[name.partition(".")[0]]
 
 
 def chosen_aovs(name: str, value: Any) -> tuple[str, ...]:

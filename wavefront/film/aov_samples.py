@@ -36,6 +36,7 @@ class AovSamples:
     counts: dict[str, Ints]  # (k,) how many samples of each pixel are 1: "coverage.NAME"
     bounded: dict[str, FixedPointSamples]
     radiance: dict[str, Floats]  # (3, samples, k): "direct", and "light_groups.NAME"
+    narrow: Floats | None = None  # (samples, k): "narrow_lobes"
 
 
 def fixed_point(values: Floats, samples: int, dropped: Ints) -> FixedPointSamples:

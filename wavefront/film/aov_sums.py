@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from ..arrays.soa import soa
 from ..arrays.state import Words
 from ..arrays.vec import Doubles, Floats, Ints, Lanes, f4
-from .aov_names import MEASURED_AOVS, aov_of
+from .aov_names import MEASURED_AOVS, NARROW, aov_of
 from .aov_samples import (
     BOUNDED,
     COUNTED,
@@ -22,6 +22,7 @@ from .aov_samples import (
 )
 from .exact_sum import ExactSums
 from .film import CHUNK, NONE, Film, add_in_order, chunks, pixel_span
+from .narrow_sums import NarrowSums
 from .sums import Sums
 
 UNIT = 2.0**-FRACTION_BITS
@@ -33,7 +34,7 @@ class AovEstimate:
     """What the samples of an AOV come to."""
 
     mean: Floats  # (pixels, c)
-    standard_error: Floats  # (pixels, c) of `mean`; NaN for fewer than two samples
+    standard_error: Floats | None  # (pixels, c) of `mean`; NaN for fewer than two samples; None: it has none
     variance: Floats | None = None  # (pixels, c) of one sample, of AOVs of measurements
 
 
@@ -169,12 +170,14 @@ class AovSums(Sums):
     radiance: dict[str, RadianceSums]
     measured: dict[str, Film]
     indirect: SquareSums | None  # its sums are those of the picture less those of "direct"
+    narrow: NarrowSums | None
 
     def __init__(self, names: Iterable[str], pixels: int) -> None:
         self.names = tuple(names)
         self._pixels = pixels
         self.counts, self.bounded, self.radiance, self.measured = {}, {}, {}, {}
         self.indirect = SquareSums(pixels) if "indirect" in self.names else None
+        self.narrow = NarrowSums(pixels) if NARROW in self.names else None
         for name in self.names:
             kind = name.partition(".")[0]
             if kind in COUNTED:
@@ -183,7 +186,7 @@ class AovSums(Sums):
                 self.bounded[name] = FixedPointSums((aov_of(name).channels, pixels))
             elif kind in MEASURED_AOVS:
                 self.measured[name] = Film(pixels, 1)
-            elif kind != "indirect":
+            elif kind not in ("indirect", NARROW):
                 self.radiance[name] = RadianceSums(pixels)
         if self.indirect is not None and "direct" not in self.radiance:
             self.radiance["direct"] = RadianceSums(pixels)
@@ -211,6 +214,8 @@ class AovSums(Sums):
             bounded.add(lanes, samples.bounded[name], most)
         for name, film in self.measured.items():
             film.add(pixels, samples.radiance[name], dropped)
+        if self.narrow is not None and samples.narrow is not None:
+            self.narrow.add(lanes, samples.narrow)
         for start in range(0, pixels.size, CHUNK):
             part = slice(start, start + CHUNK)
             lanes = pixel_span(pixels[part])
@@ -224,8 +229,11 @@ class AovSums(Sums):
         if name in self.measured:
             found = self.measured[name].estimates()
             return AovEstimate(found.mean, found.standard_error, found.variance)
+        if name == NARROW:
+            assert self.narrow is not None
+            return AovEstimate(self.narrow.typical()[:, None], None)
         shape = self._pixels, aov_of(name).channels
-        out = AovEstimate(np.empty(shape, f4), np.empty(shape, f4))
+        means, errors = np.empty(shape, f4), np.empty(shape, f4)
         for part in chunks(self._pixels):
             sums, squares = self._totals(name, picture, part)
             n = np.maximum(count[part], 1)
@@ -233,9 +241,8 @@ class AovSums(Sums):
             spread = np.maximum(squares - n * np.square(mean), 0)
             variance = np.where(count[part] > 1, spread, np.nan) / np.maximum(n - 1, 1)
             with np.errstate(over="ignore"):
-                out.mean[part] = mean.T
-                out.standard_error[part] = np.sqrt(variance / n).T
-        return out
+                means[part], errors[part] = mean.T, np.sqrt(variance / n).T
+        return AovEstimate(means, errors)
 
     def _totals(self, name: str, picture: ExactSums, part: slice) -> tuple[Doubles, Doubles]:
         """Return the sums of the samples of an AOV and of their squares, each (c, k)."""

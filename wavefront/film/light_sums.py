@@ -92,6 +92,18 @@ class LightSums(Sums):
             scatter += np.square(self.batches[str(batch)].value(span) / paths - mean) * (paths / total)
         return scatter / max(used.size - 1, 1)
 
+    def halves(self, span: slice = slice(None)) -> Doubles:
+        """Return half the difference of the means of two halves of batches, (3, k); NaN if one is empty."""
+        halves = [[batch for batch in range(BATCHES) if batch % 2 == half] for half in range(2)]
+        paths = [int(self.paths[half].sum()) for half in halves]
+        if not all(paths):
+            return np.full_like(self.mean(span), np.nan)
+        first, second = (
+            sum(self.batches[str(batch)].value(span) for batch in half) / number
+            for half, number in zip(halves, paths, strict=True)
+        )
+        return np.asarray((first - second) * (np.sqrt(float(paths[0]) * paths[1]) / sum(paths)))
+
 
 def _groups(ordered: Ints) -> tuple[Ints, Ints, Ints]:
     """Return the distinct values (d,) of rising numbers, where each begins, and how often it occurs."""

@@ -39,6 +39,7 @@ from ..film.light_sums import LightSums
 from ..film.picture_sums import PictureSums, merged_metadata, merged_sums, restored_sums
 from ..film.samples import shared_samples
 from ..statistics import (
+    PixelErrors,
     RegionMean,
     Scatter,
     film_scatter,
@@ -51,7 +52,8 @@ from ..statistics.scatter import PREFIX as SCATTER
 from .outlines import outline_coverage
 
 MEASURED = "measured."  # before the names of such arrays in files
-FIELDS = ("counts", "variance", "standard_error")  # arrays (H, W, ...) besides rgb, layers and errors
+# arrays (H, W, ...) besides rgb, layers and errors
+FIELDS = ("counts", "variance", "standard_error", "halves")
 PARTS = ("rgb", "spp", "metadata", *FIELDS, "layers", "errors", "names", "sums", "scatter", "measured")
 
 
@@ -85,6 +87,9 @@ class Image(Answers):
         the error of each pixel alone. Pixels that share paths (`metadata["reuse"]`) are correlated, so that
         the error of a mean over pixels is larger than the errors of pixels suggest: `mean` gives the error of
         a region.
+    halves
+        (H, W, 3) float32 half the difference of the means of two halves of the samples, of which `mean` and
+        `wf.compare` make the errors of means over many pixels; NaN where there are fewer than two samples.
     layers
         The AOVs by name, (H, W) or (H, W, channels): see docs/layers.md. Each is an attribute as well:
         `image.depth` is `image.layers["depth"]`.
@@ -103,8 +108,8 @@ class Image(Answers):
     measured
         Of measurements: the error of the layer "lux", and the variance of a sample of it.
 
-    `counts`, `variance` and `standard_error` are None in an image that was not rendered, `standard_error`
-    also in one that was denoised.
+    `counts`, `variance`, `standard_error` and `halves` are None in an image that was not rendered,
+    `standard_error` also in one that was denoised, and `halves` in files of earlier versions.
 
     Raises
     ------
@@ -130,6 +135,7 @@ class Image(Answers):
         counts: NDArray[np.int64] | None = None,
         variance: NDArray[np.float32] | None = None,
         standard_error: NDArray[np.float32] | None = None,
+        halves: NDArray[np.float32] | None = None,
         layers: Mapping[str, NDArray[Any]] | None = None,
         errors: Mapping[str, NDArray[np.float32]] | None = None,
         names: Mapping[str, Mapping[int, str]] | None = None,
@@ -143,6 +149,7 @@ class Image(Answers):
         self.counts = counts
         self.variance = variance
         self.standard_error = standard_error
+        self.halves = halves
         self.layers = dict(layers or {})
         self.errors = dict(errors or {})
         self.names = {kind: dict(table) for kind, table in (names or {}).items()}
@@ -221,8 +228,10 @@ class Image(Answers):
     def mean(self, region: Any = None, kind: str = "shape") -> RegionMean:
         """Return the mean of a region and its standard error, also where pixels share paths.
 
-        Pixels that share paths are correlated within tiles. Then the error comes from the scatter of batches
-        of samples over the pixels of each tile. Other pixels are independent.
+        The error comes from the difference of two halves of the samples, summed over the pixels, and where
+        they are few also from the scatter of batches of samples; what stratified samples gain beyond half of
+        them is extrapolated. Pixels that share paths are correlated within tiles, so there the differences
+        of the sums over tiles count. Other pixels are independent.
 
         Parameters
         ----------
@@ -252,14 +261,19 @@ class Image(Answers):
         >>> ball.pixels == image.mean(image.shape_id == 0).pixels
         True
         """
-        return region_mean(
-            self.rgb,
-            self._region(region, kind),
-            self.standard_error,
-            self.freedom(),
-            self.scatter,
-            self._error_absent(),
-        )
+        errors = PixelErrors(self.standard_error, self.freedom(), self.scatter, self._alone(), self.halves)
+        where = self._region(region, kind)
+        return region_mean(self.rgb, where, errors, self._most(where), self._error_absent())
+
+    def _alone(self) -> Doubles | None:
+        """Return the variance (H, W, 3) of `rgb` as of independent samples; None if it is not known."""
+        if self.variance is None or self.counts is None:
+            return None
+        return self.variance / np.maximum(self.counts, 1)[..., None].astype(np.float64)
+
+    def _most(self, region: Bools) -> int:
+        """Return the most samples of a pixel of a region."""
+        return self.spp if self.counts is None else int(self.counts[region].max())
 
     def _region(self, region: Any, kind: str) -> Bools:
         """Return the pixels (H, W) of a region, as `mean` takes it."""
@@ -360,7 +374,8 @@ class Image(Answers):
     def __sub__(self, other: Image) -> Image:
         """Return the difference of two pictures of one size: `rgb` and its standard error, no layers.
 
-        The error is that of independent pictures. It is None if one of them has none, or if they share
+        The error is that of independent pictures. The variance of one sample is known where both have
+        equally many of each pixel. The error is None if one of them has none, or if they share
         samples, since their errors then depend on each other. Where the pixels of one of them share paths
         those of the difference do as well: `metadata["reuse"]` says so, and `mean` knows it.
 
@@ -374,13 +389,17 @@ class Image(Answers):
         if self.shape != other.shape:
             sizes = " and ".join(f"{x.shape[1]}x{x.shape[0]}" for x in (self, other))
             raise SceneError(f"pictures of different sizes cannot be subtracted: {sizes}")
-        error = None
+        error = halves = counts = variance = None
         if (
             self.standard_error is not None
             and other.standard_error is not None
             and shared_samples(self.metadata, other.metadata) is None
         ):
             error = np.hypot(self.standard_error, other.standard_error)
+            if self.halves is not None and other.halves is not None:
+                halves = self.halves - other.halves
+            if _same_counts(self, other) and self.variance is not None and other.variance is not None:
+                counts, variance = self.counts, self.variance + other.variance
         sharing = [each for each in (self, other) if each.metadata.get("reuse")]
         scatter: tuple[Scatter, ...] = ()
         if error is not None and all(each.scatter for each in sharing):
@@ -388,7 +407,16 @@ class Image(Answers):
             scatter = scatter_of_difference(parts, error)
         metadata = {"reuse": bool(sharing)}
         spp = min(self.spp, other.spp)
-        return Image(self.rgb - other.rgb, spp, metadata, standard_error=error, scatter=scatter)
+        return Image(
+            self.rgb - other.rgb,
+            spp,
+            metadata,
+            counts=counts,
+            variance=variance,
+            standard_error=error,
+            halves=halves,
+            scatter=scatter,
+        )
 
     def __mul__(self, factor: ArrayLike) -> Image:
         """Return the picture times a number or an rgb triple, with its errors and its layers.
@@ -414,6 +442,7 @@ class Image(Answers):
             rgb=self.rgb * scale,
             variance=None if self.variance is None else self.variance * size**2,
             standard_error=None if self.standard_error is None else self.standard_error * size,
+            halves=None if self.halves is None else self.halves * scale,
             layers=scaled(self.layers, scale),
             errors=scaled(self.errors, size),
             sums=None,
@@ -553,6 +582,7 @@ class Image(Answers):
             counts=found.arrays.get("counts"),
             variance=found.arrays.get("variance"),
             standard_error=found.arrays.get("standard_error"),
+            halves=found.arrays.get("halves"),
             layers=layers,
             errors=errors,
             names=found.info.get("names"),
@@ -607,6 +637,7 @@ class Image(Answers):
             rgb=np.asarray(self.rgb * left + ink * covered[..., None], np.float32),
             variance=None if self.variance is None else self.variance * left**2,
             standard_error=None if self.standard_error is None else self.standard_error * left,
+            halves=None if self.halves is None else self.halves * left,
             layers=layers,
             sums=None,
         )
@@ -905,8 +936,14 @@ def _film_rgb(film: Film, metadata: Mapping[str, Any]) -> Image:
         counts=film.used().reshape(height, width).copy(),
         variance=estimates.variance.reshape(shape),
         standard_error=error,
+        halves=estimates.halves.reshape(shape),
         scatter=scatter,
     )
+
+
+def _same_counts(a: Image, b: Image) -> bool:
+    """Return whether two pictures have equally many samples of each pixel."""
+    return a.counts is not None and b.counts is not None and np.array_equal(a.counts, b.counts)
 
 
 def _as_arrays(value: Any) -> Any:
@@ -926,10 +963,13 @@ def _add_aovs(image: Image, sums: PictureSums) -> None:
     for name in sums.layers.names:
         found = sums.layers.estimate(name, sums.film.sums, sums.film.used())
         image.layers[name] = _of_shape(found.mean, width, height)
+        if found.standard_error is None:
+            continue
+        error = _of_shape(found.standard_error, width, height)
         if found.variance is None:
-            image.errors[name] = _of_shape(found.standard_error, width, height)
+            image.errors[name] = error
         else:
-            image.measured[name + STANDARD_ERROR] = _of_shape(found.standard_error, width, height)
+            image.measured[name + STANDARD_ERROR] = error
             image.measured[name + VARIANCE] = _of_shape(found.variance, width, height)
     if sums.film.light is not None and "indirect" in image.layers:
         _add_light_tracing(image, sums.film.light)

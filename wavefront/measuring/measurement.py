@@ -10,18 +10,21 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..arrays.vec import Doubles
-from ..core.errors import SaveError, SceneError, one_of
+from ..core.errors import SaveError, SceneError, number, one_of
 from ..core.files import check_target, write_bytes
 from ..core.plural import plural
 from ..core.suggestions import Answers, suggests_keywords
-from ..film.aov_names import LUX, STANDARD_ERROR, VARIANCE
+from ..film.aov_names import BRIGHTEST, BRIGHTEST_LUX, LUX, NARROW, STANDARD_ERROR, VARIANCE
 from ..image import Image
-from ..statistics import RegionMean
+from ..sampling.tiles import MEMBERS, nearby_ranks
+from ..statistics import event_of, light_limits, moderated_variance, rule_of_three
 from .units import PHOTOMETRIC
 
 COLORS = ("r", "g", "b")
-PLACES = ("position", "normal", "scale")  # layers that belong to the sensors
+PLACES = ("position", "normal", "scale", NARROW)  # layers that belong to the sensors
 KINDS_OF_LIGHT = ("broadband", "visible")
+SCATTERED = 0.25  # relative error of a value, or of those near it, that is still called reliable
+DOUBT = 0.1  # part of the value that may be unseen where it is
 
 
 class Measurement(Answers):
@@ -107,22 +110,82 @@ class Measurement(Answers):
     def interval(self, confidence: float = 0.95) -> tuple[Doubles, Doubles]:
         """Return the confidence interval of each value: lower and upper limits, (n, 3) each.
 
-        It is that of Student's t distribution; its degrees of freedom are the batches of samples, of which
-        the standard error is made, less one.
+        The limits are those of gamma distributions, since sums of few samples are skewed, and of an error
+        that includes what those samples may have missed, so they are wider than two standard errors; the
+        upper one the more. Light that only smooth surfaces and very narrow reflections can find, such as a
+        caustic, widens the upper limit until samples are so many that it is hardly missed. Formulas and
+        sources are in `wavefront/statistics/limits.py`, what was found is in docs/measuring.md.
 
         Parameters
         ----------
         confidence
-            The probability that it contains the true value, above 0 and below 1.
+            The probability that it contains the true value, above 0 and below 1. `reliable` says where that
+            can be trusted.
 
         Raises
         ------
         SceneError
             If the confidence is out of range.
         """
-        freedom = self._rows(self.image.freedom())[:, None]
-        value, error = (each.astype(np.float64) for each in (self.value, self.standard_error))
-        return RegionMean(value, error, freedom, self._count).interval(confidence)
+        confidence = number("interval: confidence", confidence, lambda x: 0 < x < 1, "above 0 and below 1")
+        mean, variance, freedom = self._moderated()
+        event = event_of(mean, variance)
+        event = np.maximum(event, self._near(event))
+        low, high = light_limits(mean, variance, freedom, event, confidence)
+        return self._scaled(low), self._scaled(high + self._unseen(confidence))
+
+    @property
+    def reliable(self) -> NDArray[np.bool_]:
+        """(n,) whether an interval can be trusted: enough of the light was met, at the point and near it.
+
+        It is where the relative error is at most 25 %, light that smooth surfaces and narrow reflections may
+        bring unseen is at most a tenth of the value at 95 %, and samples of the sixteen points that lie
+        nearest scatter by at most a quarter of √n, relative to their values. False for fewer than two
+        samples, for points without light, and for files of versions that did not record narrow reflections.
+
+        Examples
+        --------
+        >>> lamp = wf.Sphere((0, 0, 3), 0.5, emission=2)
+        >>> wf.measure([lamp], [(0, 0, 0)], (0, 0, 1), spp=16).reliable
+        array([ True])
+        """
+        mean, variance, _ = self._moderated()
+        samples = self.samples[:, None].astype(np.float64)
+        lit = np.where(mean > 0, mean, 1)
+        with np.errstate(invalid="ignore"):  # of fewer than two samples
+            known = np.sqrt(variance) <= SCATTERED * lit
+            deviation = np.sqrt(self._rows(self.image.variance).astype(np.float64))
+            relative = np.where(mean > 0, deviation / lit / np.sqrt(samples), (mean > 0).any(0))
+            known &= self._near(relative) <= SCATTERED
+        known &= self._unseen(0.95) <= DOUBT * mean
+        return np.asarray(known.all(1) & (mean > 0).any(1) & (BRIGHTEST in self.metadata))
+
+    def _moderated(self) -> tuple[Doubles, Doubles, Doubles]:
+        """Return means, their variances and the degrees of freedom of these, (n, 3) each, in radiance."""
+        rows = (self.image.rgb, self.image.variance, self.image.standard_error)
+        mean, single, error = (self._rows(each).astype(np.float64) for each in rows)
+        samples = np.broadcast_to(np.maximum(self.samples, 2)[:, None].astype(np.float64), mean.shape)
+        freedom = np.broadcast_to(self._rows(self.image.freedom())[:, None], mean.shape)
+        return mean, *moderated_variance(samples, mean, single / samples, np.square(error), freedom)
+
+    def _near(self, values: Doubles) -> Doubles:
+        """Return the means (n, 3) of values over the sixteen points that lie near each other, (n, 3)."""
+        tile = nearby_ranks(self.points.astype(np.float64), self.normals) // MEMBERS
+        sums = np.stack([np.bincount(tile, channel) for channel in values.T], 1)
+        return (sums / np.bincount(tile)[:, None]).take(tile, 0)
+
+    def _unseen(self, confidence: float) -> Doubles:
+        """Return the light (n, 3) that narrow lobes may bring, and that no sample has met, as radiance."""
+        narrow = self.image.layers.get(NARROW)
+        if narrow is None:
+            return np.zeros(self.value.shape)
+        chance = rule_of_three(confidence, self.samples)
+        return (chance * self._rows(narrow))[:, None] * np.array(self.metadata[BRIGHTEST])
+
+    def _scaled(self, values: Doubles) -> Doubles:
+        """Return values (n, 3) of pixels as power where the sensors are surfaces."""
+        scale = self.image.layers.get("scale")
+        return values if scale is None else values * self._rows(scale)[:, None]
 
     @property
     def direct(self) -> NDArray[np.float32]:
@@ -210,11 +273,14 @@ class Measurement(Answers):
         if LUX not in image.layers:
             raise SceneError("lux is not known: the file was made before measurements kept it")
         layers = {name: image.layers[name] for name in PLACES if name in image.layers}
+        metadata = {name: value for name, value in image.metadata.items() if name != BRIGHTEST}
+        if BRIGHTEST_LUX in metadata:
+            metadata[BRIGHTEST] = metadata[BRIGHTEST_LUX]
         return Measurement(
             Image(
                 image.layers[LUX],
                 image.spp,
-                image.metadata,
+                metadata,
                 counts=image.counts,
                 variance=image.measured[LUX + VARIANCE],
                 standard_error=image.measured[LUX + STANDARD_ERROR],

@@ -19,7 +19,7 @@ from ..integrators.light_tracing import Splats
 from .jobs import Job, JobResult, WaveResult
 
 MAX_BAD_SAMPLES = 1e-4  # part of all samples that may be lost to NaN before it is an error
-PICTURE_BYTES = 96  # of a pixel of the picture, and of what is needed to make it
+PICTURE_BYTES = 108  # of a pixel of the picture, and of what is needed to make it
 AOV_BYTES = 8  # of a pixel and channel of an AOV and its error
 SPARE_BYTES = 16 << 20
 

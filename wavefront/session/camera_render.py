@@ -13,9 +13,12 @@ from numpy.typing import NDArray
 
 from ..aovs.boxes import object_boxes
 from ..aovs.geometric import IDS, geometric_aovs
+from ..aovs.lux import lux_of
 from ..camera import Camera
+from ..colors import EFFICACY
+from ..compile.brightest import brightest_emitter
 from ..compile.scene import CompiledScene
-from ..film.aov_names import BOXES, geometric_names
+from ..film.aov_names import BOXES, BRIGHTEST, BRIGHTEST_LUX, NARROW, geometric_names
 from ..film.checkpoint import Checkpoint
 from ..image import Image
 from ..scheduling.accumulator import Accumulator
@@ -209,7 +212,16 @@ class CameraRender:
             "interrupted": cut_short,
             "version": VERSION,
             "numpy": np.__version__,
+            **({} if self.camera.sensor is None else self._brightest()),
         }
+
+    def _brightest(self) -> dict[str, list[float]]:
+        """Return what the brightest emitter sends, (3,) each; zeros where sensors need no such record."""
+        compiled, recorded = self._plan.scene.compiled, NARROW in self._plan.tracer.layers
+        most = brightest_emitter(compiled) if recorded else np.zeros(3)
+        efficacies = compiled.light_efficacies.names or (EFFICACY,)
+        lux = lux_of([max(efficacies)], [most[:, None].astype(np.float32)])[0, 0]
+        return {BRIGHTEST: most.tolist(), BRIGHTEST_LUX: [float(lux)] * 3}
 
     def _geometric_aovs(self, compiled: CompiledScene) -> dict[str, NDArray[Any]]:
         """Return the geometric AOVs that are asked for; the first time, trace them and the boxes."""

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 
+from ..aovs.narrow_lobes import narrow_aovs
 from ..arrays.soa import soa
 from ..camera import Camera
 from ..core.progress import phase
@@ -65,7 +66,7 @@ def make_plan(settings: Settings, scene: PreparedScene, camera: Camera, table: G
         FILTERS.find(settings.values["filter"]),
         INTEGRATORS.find(settings.values["integrator"]),
         settings.values["max_bounces"],
-        (*settings.sampled_aovs, *((LUX,) if camera.sensor is not None else ())),
+        (*settings.sampled_aovs, *_aovs_of_sensors(scene, camera)),
         table,
         settings.values["clamp"],
     )
@@ -74,3 +75,8 @@ def make_plan(settings: Settings, scene: PreparedScene, camera: Camera, table: G
         executor = "threads"
     budget = settings.budget(camera.size, executor, tracer.recorded_aovs)
     return Plan(settings, scene, tracer, executor, budget)
+
+
+def _aovs_of_sensors(scene: PreparedScene, camera: Camera) -> tuple[str, ...]:
+    """Return the AOVs that sensors have, whether they are asked for or not."""
+    return () if camera.sensor is None else (LUX, *narrow_aovs(scene.compiled))

@@ -1,6 +1,7 @@
 """Statistics of pictures: the errors of means over pixels, also where pixels depend on each other."""
 
-from .region import RegionMean, region_mean
+from .limits import event_of, light_limits, moderated_variance, rule_of_three
+from .region import PixelErrors, RegionMean, region_mean
 from .scatter import (
     Scatter,
     film_scatter,
@@ -11,11 +12,16 @@ from .scatter import (
 )
 
 __all__ = [
+    "PixelErrors",
     "RegionMean",
     "Scatter",
+    "event_of",
     "film_scatter",
+    "light_limits",
+    "moderated_variance",
     "region_mean",
     "restored_scatter",
+    "rule_of_three",
     "scatter_arrays",
     "scatter_of_difference",
     "sums_by_label",

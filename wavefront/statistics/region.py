@@ -2,16 +2,22 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
+from ..arrays.soa import soa
 from ..arrays.vec import Bools, Doubles, Floats
 from ..core.errors import SceneError, number
 from ..core.suggestions import suggests_keywords
 from .scatter import Scatter, sums_by_label
 from .student_t import t_quantile
+
+FEW = 8.0  # pixels, or tiles, for which the scatter of batches counts as much as the differences of halves
+LEAST_EXTRAPOLATED = 12  # samples from where on halves of them show what stratification gains
 
 
 @dataclass(frozen=True, slots=True)
@@ -58,32 +64,82 @@ class RegionMean:
         return self.value - away, self.value + away
 
 
+@soa
+class PixelErrors:
+    """What is known of the errors of the pixels of a picture."""
+
+    standard_error: Floats | None  # (H, W, 3) from the scatter of batches
+    freedom: Doubles  # (H, W) its degrees of freedom
+    scatter: Sequence[Scatter] = ()  # of the picture, for each part of it that shares paths
+    alone: Doubles | None = None  # (H, W, 3) squared errors as of independent samples
+    halves: Floats | None = None  # (H, W, 3) half the differences of the means of two halves of the samples
+
+
 def region_mean(
-    rgb: Floats,
-    region: Bools,
-    standard_error: Floats | None,
-    freedom: Doubles,
-    scatter: Sequence[Scatter],
-    error_absent: str,
+    rgb: Floats, region: Bools, errors: PixelErrors, samples: int, error_absent: str
 ) -> RegionMean:
     """Return the mean of the pixels `region` (H, W) of a picture (H, W, 3).
 
     Parameters
     ----------
-    standard_error, freedom, scatter
-        As for `sums_by_label`.
+    samples
+        The most that a pixel of the region has.
     error_absent
         The reason why the error is not known, or nothing.
     """
     pixels = int(np.count_nonzero(region))
     value = rgb[region].mean(0, dtype=np.float64)
-    if error_absent or standard_error is None:
+    if error_absent or errors.standard_error is None:
         return RegionMean(value, None, None, pixels, error_absent)
     label = np.where(region, 0, -1)
-    variance, spread = sums_by_label(standard_error, freedom, scatter, label, 1)
-    known = spread > 0
-    found = np.square(variance) / np.where(known, spread, 1)
-    least = float(freedom[region].min())
-    return RegionMean(
-        value, np.sqrt(variance[0]) / pixels, np.where(known, np.maximum(found, 1), least)[0], pixels
-    )
+    (variance,), (spread,) = sums_by_label(errors.standard_error, errors.freedom, errors.scatter, label, 1)
+    known, least = spread > 0, float(errors.freedom[region].min())
+    freedom = np.maximum(np.square(variance) / np.where(known, spread, 1), 1)
+    error = np.sqrt(_by_halves(variance, region, errors, samples)) / pixels
+    return RegionMean(value, error, np.where(known, freedom, least), pixels)
+
+
+def _by_halves(variance: Doubles, region: Bools, errors: PixelErrors, samples: int) -> Doubles:
+    """Return the variance (3,) of the sum over a region, given that by the scatter of batches.
+
+    Batches are short, so their scatter does not show all that stratified samples gain. The squared
+    differences of halves show nearly all of it, but are of one degree of freedom for each pixel; where these
+    are few, the scatter counts, too. From half of the samples to all of them the gain is extrapolated.
+    """
+    tile = _common_tile(errors.scatter)
+    if errors.halves is None or (errors.scatter and tile is None):
+        return variance
+    halves = errors.halves[region].astype(np.float64)
+    sums = halves if tile is None else sums_of_tiles(halves, tile[region])
+    found = (np.square(sums).sum(0) + FEW / len(sums) * variance) / (1 + FEW / len(sums))
+    if errors.alone is None or samples < LEAST_EXTRAPOLATED:
+        return np.asarray(found)
+    assert errors.standard_error is not None
+    batches = np.square(errors.standard_error[region], dtype=np.float64).sum(0)
+    few, alone = FEW / len(halves), errors.alone[region].sum(0)
+    part = (np.square(halves).sum(0) + few * batches) / (1 + few)
+    gain = np.minimum(part / np.where(alone > 0, alone, 1), 1)
+    return np.asarray(found * gain ** (_steps_of_gain(samples) / (1 + few)))
+
+
+def _steps_of_gain(samples: int) -> float:
+    """Return the power of the gain of half of the samples that is the further gain of all of them.
+
+    The part of the variance that is left falls as a power of the number of stratified samples, so the step
+    from half of them to all is one of as many as there are doublings. It is one and a half where most of a
+    net in base 4 is complete, as was found with three scenes (docs/convergence.md).
+    """
+    net = 4 ** ((samples - 1).bit_length() + 1 >> 1)  # the smallest one that holds so many samples
+    return (1.5 if samples >= 0.75 * net else 1.0) / math.log2(samples / 2)
+
+
+def _common_tile(scatter: Sequence[Scatter]) -> NDArray[np.int32] | None:
+    """Return the tiles (H, W) that share paths, if those of all parts of a picture are the same."""
+    tiles = [each.tile for each in scatter]
+    return tiles[0] if tiles and all((each == tiles[0]).all() for each in tiles) else None
+
+
+def sums_of_tiles(values: Doubles, tile: NDArray[np.int32]) -> Doubles:
+    """Return the sums (tiles, 3) of values (k, 3) over the pixels of each tile, given their tiles (k,)."""
+    order = np.argsort(tile, kind="stable")
+    return np.add.reduceat(values[order], np.flatnonzero(np.diff(tile[order], prepend=-1)), axis=0)

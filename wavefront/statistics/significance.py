@@ -16,12 +16,16 @@ from numpy.typing import NDArray
 
 from ..arrays.soa import soa
 from ..arrays.vec import Doubles, Ints, distinct
-from . import Scatter, sums_by_label
+from ..film.film import EPSILON
+from .limits import UNSEEN
+from .region import sums_of_tiles
+from .scatter import Scatter, sums_by_label
 from .student_t import log_gamma, t_tail
 
 BLOCKS = (8, 32)  # pixels along the sides of blocks
 ROUNDING = 1e-5  # relative difference of two means that is left to float32
-LEAST_TILES = 32  # that take the place of samples in a t test
+LEAST_SAMPLES = 32  # pixels or tiles that take the place of samples in a t test
+WINDOW = 5  # pixels along the sides of those around a pixel that say how noisy it is
 TINY = 1e-300
 
 
@@ -63,41 +67,93 @@ def significance(a: Estimate, b: Estimate) -> Significance:
 
 
 def _p_of_mean(a: Estimate, b: Estimate) -> Doubles:
-    """Return the p-values (..., 3) of the difference of the means of whole pictures.
+    """Return the p-values (k, 3) of the difference of the means of whole pictures, of k tests.
 
-    Where pixels share paths, tiles are the samples: the differences of the sums over tiles are independent,
-    and their mean is 0 if the pictures are the same, so Student's t test needs no errors of pixels. Those
-    are too large for few samples, since they leave out what stratification gains between batches, which are
-    as short as one sample. With about as many samples in both pictures the differences are symmetric, and
-    the test is a cautious one however much their variances differ (Y. Benjamini, Is the t Test Really
-    Conservative when the Parent Distribution is Long-Tailed?, 1983).
+    Pixels are the samples: their differences are independent, and the mean of each is 0 if the pictures are
+    the same, so Student's t test needs no errors of pixels. Those are too large for few samples, since they
+    leave out what stratification gains between batches, which are as short as one sample. Where pixels share
+    paths, tiles are the samples. With about as many samples in both pictures the differences are nearly
+    symmetric, and the test is a cautious one however much their variances differ (Y. Benjamini, Is the t Test
+    Really Conservative when the Parent Distribution is Long-Tailed?, 1983).
+
+    A second test is of weighted differences, since a few pixels are often much noisier than all others. The
+    weight of each pixel comes from the variances of those around it: it is independent of the pixel's own
+    difference, so the mean of their product is 0 likewise, for pictures of whatever noise.
     """
-    tile = _common_tiles(a, b)
-    if tile is None:
+    if not _are_alike(a, b):
         side = max(a.mean.shape[:2])
         return p_values(_averaged(a, side), _averaged(b, side))
-    order = np.argsort(tile.ravel(), kind="stable")
-    starts = np.flatnonzero(np.diff(tile.ravel()[order], prepend=-1))
-    first, second = (np.add.reduceat(each.mean.reshape(-1, 3)[order], starts, axis=0) for each in (a, b))
-    apart, count = first - second, len(starts)
+    tile = _common_tiles(a, b)
+    weight = _quietness(a, b)
+    return np.stack([_p_of_sums(a.mean * each, b.mean * each, tile) for each in (np.ones(1), weight)])
+
+
+def _p_of_sums(first: Doubles, second: Doubles, tile: NDArray[np.int32] | None) -> Doubles:
+    """Return the p-values (3,) of the difference of the sums of pictures (H, W, 3), with tiles as samples."""
+    first, second = first.reshape(-1, 3), second.reshape(-1, 3)
+    if tile is not None:
+        first, second = (sums_of_tiles(each, tile.ravel()) for each in (first, second))
+    apart, count = first - second, len(first)
     rounding = ROUNDING * np.maximum(np.abs(first.mean(0)), np.abs(second.mean(0)))
     off = np.maximum(np.abs(apart.mean(0)) - rounding, 0)
     p = _two_sided(off, apart.var(0, ddof=1) / count, np.full(3, count - 1.0))
     return np.where(off > 0, p, 1.0)
 
 
-def _common_tiles(a: Estimate, b: Estimate) -> NDArray[np.int32] | None:
-    """Return the tiles (H, W) of which the pixels of both pictures are independent.
+def _quietness(a: Estimate, b: Estimate) -> Doubles:
+    """Return weights (H, W, 3): the inverse of the variance of the pixels around each, their geometric mean.
 
-    None if no pixels share paths, if it is not known which ones do, if there are few tiles, or if one of the
-    pictures has more than twice as many samples as the other.
+    Unlike the arithmetic mean it says little of rare, bright samples. Pixels without any variance, as those
+    of a background, do not count. To the others comes that of a sample which was not seen, as of values not
+    much below the picture's mean.
     """
+    alone = _alone(a) + _alone(b)
+    mean, samples = (a.mean + b.mean) / 2, np.minimum(a.samples, b.samples)
+    squared = np.square(mean) + EPSILON * np.square(mean.mean((0, 1)))
+    noisy = alone > 0
+    logarithm = np.log(np.where(noisy, alone + 2 * squared * np.square(UNSEEN / samples), 1))
+    total, count = (_around(each) for each in (logarithm, noisy.astype(np.float64)))
+    quiet = np.where(count > 0, np.exp(-total / np.maximum(count, 1)), 0)
+    most = quiet.max((0, 1))
+    return np.asarray(quiet / np.where(most > 0, most, 1))
+
+
+def _around(values: Doubles) -> Doubles:
+    """Return the sums of values (H, W, 3) over the windows around pixels, without the pixels themselves."""
+    sums = values
+    for axis in (0, 1):
+        length = values.shape[axis]
+        total = np.concatenate([np.zeros_like(sums.take([0], axis)), sums.cumsum(axis)], axis)
+        at = np.arange(length)
+        last = np.minimum(at + WINDOW // 2 + 1, length)
+        sums = total.take(last, axis) - total.take(np.maximum(at - WINDOW // 2, 0), axis)
+    return sums - values
+
+
+def _alone(picture: Estimate) -> Doubles:
+    """Return squared errors as of independent samples, or those that are known."""
+    known = picture.variance.any()
+    return picture.variance / picture.samples if known else picture.squared_error
+
+
+def _are_alike(a: Estimate, b: Estimate) -> bool:
+    """Return whether pixels, or tiles, can be the samples of a t test of two pictures.
+
+    They cannot if they are few, if it is not known which pixels share paths, or if one of the pictures has
+    more than twice as many samples as the other.
+    """
+    fewer, more = sorted(float(each.samples.sum()) for each in (a, b))
     tiles = [each.tile for picture in (a, b) for each in picture.scatter]
     unknown = any(each.sharing > 1 and not each.scatter for each in (a, b))
-    fewer, more = sorted(float(each.samples.sum()) for each in (a, b))
-    if not tiles or unknown or more > 2 * fewer or any((each != tiles[0]).any() for each in tiles):
-        return None
-    return tiles[0] if len(distinct(tiles[0].ravel().astype(np.intp))) >= LEAST_TILES else None
+    if unknown or more > 2 * fewer or any((each != tiles[0]).any() for each in tiles):
+        return False
+    samples = len(distinct(tiles[0].ravel().astype(np.intp))) if tiles else a.mean[..., 0].size
+    return samples >= LEAST_SAMPLES
+
+
+def _common_tiles(a: Estimate, b: Estimate) -> NDArray[np.int32] | None:
+    """Return the tiles (H, W) of which the pixels of both pictures are independent; None: pixels are."""
+    return next((each.tile for picture in (a, b) for each in picture.scatter), None)
 
 
 def _cautious(picture: Estimate) -> Estimate:
