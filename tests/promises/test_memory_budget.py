@@ -89,7 +89,7 @@ def test_what_cannot_fit_is_refused_with_the_figures() -> None:
     scene.camera = wf.Camera.look_at((0, 0, 4), (0, 0, 0), size=(4096, 2048))
     message = (
         r"max_memory is 1,000 MB; [\d,]+ MB are needed: [\d,]+ MB are in use already, "
-        r"2,298 MB are for a picture of 4096x2048 pixels, and \d+ MB for one worker"
+        r"2,399 MB are for a picture of 4096x2048 pixels, and \d+ MB for one worker"
     )
     with pytest.raises(wf.SceneError, match=message):
         wf.render(scene, 1, max_memory="1GB")

@@ -9,8 +9,9 @@ import wavefront as wf
 from wavefront.film.film import Film
 from wavefront.film.picture_sums import PictureSums
 from wavefront.film.samples import shared_samples
+from wavefront.image.comparison import _estimate
 from wavefront.image.image import film_image
-from wavefront.statistics.significance import sidak
+from wavefront.statistics.significance import _around, _p_of_mean, sidak
 from wavefront.statistics.student_t import log_gamma, t_tail
 
 SIZE = 16
@@ -97,12 +98,68 @@ def test_false_alarms(draw, spp) -> None:
         assert ((found <= chance).sum(0) <= most(runs, chance)).all(), (found <= chance).mean(0)
 
 
+def p_of_means(rng, first, second, runs):
+    """p-values (runs, 2, 3) of the means of pairs of pictures: of pixels alike, and of weighted ones."""
+    pairs = ([noisy(rng, draw) for draw in (first, second)] for _ in range(runs))
+    return np.array(
+        [_p_of_mean(*(_estimate(each, each.rgb.astype(float)) for each in pair)) for pair in pairs]
+    )
+
+
 @pytest.mark.slow
 def test_p_of_the_mean_is_uniform() -> None:
     """Without noise that is hard to estimate; the three channels are independent here."""
-    rng = np.random.default_rng(1)
-    p = [wf.compare(noisy(rng, gaussian), noisy(rng, gaussian)).p_mean for _ in range(200)]
-    assert stats.kstest(p, "uniform").pvalue > 1e-4
+    p = p_of_means(np.random.default_rng(1), gaussian, gaussian, 200)
+    for each in (p[:, 0], p[:, 1]):
+        assert stats.kstest(each.ravel(), "uniform").pvalue > 1e-4
+
+
+def quiet(rng, shape):
+    """The mean of `fireflies`, with little noise."""
+    return rng.uniform(1.98, 2.0, shape)
+
+
+def noisy_in_a_corner(rng, shape):
+    """A quarter of the pixels has nearly all noise, as where a lamp is half hidden."""
+    return rng.normal(3, np.where(np.arange(shape[2]) < shape[2] // 4, 4, 0.05), shape)
+
+
+@pytest.mark.parametrize(
+    "pair", [(heavy, heavy), (fireflies, quiet), (fireflies, fireflies), (flashes, quiet)]
+)
+def test_weights_raise_no_false_alarms(pair) -> None:
+    """Nor where one picture has another noise than the other, as one of another estimator has."""
+    rng, runs = np.random.default_rng(4), 60
+    scale = np.mean(pair[0](rng, 10**6)) / np.mean(pair[1](rng, 10**6))
+    p = p_of_means(rng, pair[0], lambda *args: scale * pair[1](*args), runs)
+    assert ((p[:, 1] <= 0.05).sum(0) <= most(runs, 0.05)).all(), (p[:, 1] <= 0.05).mean(0)
+
+
+def test_weights_find_what_few_noisy_pixels_hide() -> None:
+    """One percent, of pixels of which a quarter has all noise."""
+    rng = np.random.default_rng(5)
+    a, b = noisy(rng, noisy_in_a_corner, 16, 32), noisy(rng, noisy_in_a_corner, 16, 32)
+    assert wf.compare(a, b).p_mean > 0.01
+    found = _p_of_mean(*(_estimate(each, each.rgb.astype(float)) for each in (1.01 * a, b)))
+    assert (found[1] < 1e-6).all()
+    assert found[0].min() > 1e-3
+    assert wf.compare(1.01 * a, b).p_mean < 1e-5
+
+
+def test_pictures_with_unequal_samples_have_the_errors_of_batches() -> None:
+    rng = np.random.default_rng(6)
+    a, b = (
+        _estimate(each, each.rgb.astype(float)) for each in (noisy(rng, gaussian, 64), noisy(rng, gaussian))
+    )
+    assert _p_of_mean(a, b).shape == (1, 1, 3)
+
+
+def test_windows_leave_out_their_pixels() -> None:
+    values = np.random.default_rng(7).random((7, 4, 3))
+    due = [
+        [values[max(y - 2, 0) : y + 3, max(x - 2, 0) : x + 3].sum((0, 1)) for x in range(4)] for y in range(7)
+    ]
+    assert _around(values) == pytest.approx(np.array(due) - values)
 
 
 @pytest.mark.parametrize(("field", "where"), [("p_pixels", 3), ("p_blocks", 8), ("p_mean", SIZE)])

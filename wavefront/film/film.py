@@ -267,8 +267,9 @@ class Film(Sums):
 
         Its square is an estimate of the variance of `mean` that includes what a stratified sampler gains
         within half of the samples, so nearly all. It is of one degree of freedom: only sums over many pixels
-        tell something. The halves are those of the batches; where these are odd in number, or of different
-        lengths, the difference is scaled accordingly. NaN for fewer than two samples.
+        tell something. The halves are those of the batches; where these are odd in number, of different
+        lengths, or without the last samples, the difference is scaled accordingly. NaN for fewer than two
+        samples.
         """
         found = np.full((3, self.count[span].size), np.nan)
         lengths = self.lengths[self.lengths > 0]
@@ -276,7 +277,8 @@ class Film(Sums):
             if count > 1:
                 lanes = np.flatnonzero(self.count[span] == count)
                 each = lengths if lengths.size else np.full(count // batch_size(count), batch_size(count))
-                found[:, lanes] = _half_difference(take(self.batches[: each.size, :, span], lanes), each)
+                apart = _half_difference(take(self.batches[: each.size, :, span], lanes), each)
+                found[:, lanes] = apart * np.sqrt(each.sum() / count)
         if self.dropped.size:
             some = np.flatnonzero(self.dropped[span])
             alone = self._variance_of_samples(span) / np.maximum(self.used(span), 1)

@@ -9,7 +9,7 @@ from typing import Any, Self
 import numpy as np
 from numpy.typing import NDArray
 
-from ..arrays.vec import Doubles
+from ..arrays.vec import Bools, Doubles
 from ..core.errors import SaveError, SceneError, number, one_of
 from ..core.files import check_target, write_bytes
 from ..core.plural import plural
@@ -130,7 +130,7 @@ class Measurement(Answers):
         confidence = number("interval: confidence", confidence, lambda x: 0 < x < 1, "above 0 and below 1")
         mean, variance, freedom = self._moderated()
         event = event_of(mean, variance)
-        event = np.maximum(event, self._near(event))
+        event = np.maximum(event, self._near(event, mean > 0))
         low, high = light_limits(mean, variance, freedom, event, confidence)
         return self._scaled(low), self._scaled(high + self._unseen(confidence))
 
@@ -140,8 +140,9 @@ class Measurement(Answers):
 
         It is where the relative error is at most 25 %, light that smooth surfaces and narrow reflections may
         bring unseen is at most a tenth of the value at 95 %, and samples of the sixteen points that lie
-        nearest scatter by at most a quarter of √n, relative to their values. False for fewer than two
-        samples, for points without light, and for files of versions that did not record narrow reflections.
+        nearest scatter by at most a quarter of √n in the mean, relative to their values. False for fewer
+        than two samples, for points without light, and for files of versions that did not record narrow
+        reflections.
 
         Examples
         --------
@@ -155,8 +156,7 @@ class Measurement(Answers):
         with np.errstate(invalid="ignore"):  # of fewer than two samples
             known = np.sqrt(variance) <= SCATTERED * lit
             deviation = np.sqrt(self._rows(self.image.variance).astype(np.float64))
-            relative = np.where(mean > 0, deviation / lit / np.sqrt(samples), (mean > 0).any(0))
-            known &= self._near(relative) <= SCATTERED
+            known &= self._near(deviation / lit / np.sqrt(samples), mean > 0) <= SCATTERED
         known &= self._unseen(0.95) <= DOUBT * mean
         return np.asarray(known.all(1) & (mean > 0).any(1) & (BRIGHTEST in self.metadata))
 
@@ -168,11 +168,12 @@ class Measurement(Answers):
         freedom = np.broadcast_to(self._rows(self.image.freedom())[:, None], mean.shape)
         return mean, *moderated_variance(samples, mean, single / samples, np.square(error), freedom)
 
-    def _near(self, values: Doubles) -> Doubles:
-        """Return the means (n, 3) of values over the sixteen points that lie near each other, (n, 3)."""
+    def _near(self, values: Doubles, lit: Bools) -> Doubles:
+        """Return the means (n, 3) of values over those of the sixteen points near each other that are lit."""
         tile = nearby_ranks(self.points.astype(np.float64), self.normals) // MEMBERS
-        sums = np.stack([np.bincount(tile, channel) for channel in values.T], 1)
-        return (sums / np.bincount(tile)[:, None]).take(tile, 0)
+        counted = [np.where(lit, values, 0), lit.astype(np.float64)]
+        sums, count = (np.stack([np.bincount(tile, row) for row in each.T], 1) for each in counted)
+        return (sums / np.maximum(count, 1)).take(tile, 0)
 
     def _unseen(self, confidence: float) -> Doubles:
         """Return the light (n, 3) that narrow lobes may bring, and that no sample has met, as radiance."""

@@ -10,7 +10,9 @@ from ..arrays.vec import Doubles
 
 CHUNK = 1 << 17  # values that are computed together: few enough for the cache
 ITERATIONS = 400  # at most, of the continued fraction
-BISECTIONS = 50
+STEPS = 60  # of Newton's method, at most
+LONGEST = 2.0  # step of the logarithm
+LEAST_SLOPE = 1e-300
 
 
 def t_tail(t: Doubles, freedom: Doubles) -> Doubles:
@@ -29,13 +31,21 @@ def t_tail(t: Doubles, freedom: Doubles) -> Doubles:
 
 
 def t_quantile(confidence: float, freedom: Doubles) -> Doubles:
-    """Return t (n,) for which P(|T| < t) of Student's distribution is `confidence`, by bisection."""
-    low, high = np.full_like(freedom, -20.0), np.full_like(freedom, 30.0)  # logarithms
-    for _ in range(BISECTIONS):
-        middle = (low + high) / 2
-        inside = 1 - t_tail(np.exp(middle), freedom) < confidence
-        low, high = np.where(inside, middle, low), np.where(inside, high, middle)
-    return np.exp((low + high) / 2)
+    """Return t (n,) for which P(|T| < t) of Student's distribution is `confidence`.
+
+    By Newton's method for ln P(|T| ≥ t), a concave function of ln t.
+    """
+    due, at = math.log1p(-confidence), np.zeros_like(freedom)
+    scale = log_gamma((freedom + 1) / 2) - log_gamma(freedom / 2) - np.log(freedom * math.pi) / 2
+    for _ in range(STEPS):
+        t = np.exp(at)
+        tail = t_tail(t, freedom)
+        density = np.exp(scale - (freedom + 1) / 2 * np.log1p(np.square(t) / freedom))
+        step = (np.log(tail) - due) * tail / np.maximum(2 * t * density, LEAST_SLOPE)
+        at += np.clip(step, -LONGEST, LONGEST)
+        if (np.abs(step) < 1e-12).all():
+            break
+    return np.exp(at)
 
 
 def _incomplete_beta(x: Doubles, rest: Doubles, a: Doubles, b: Doubles) -> Doubles:
