@@ -102,7 +102,7 @@ def p_of_means(rng, first, second, runs):
     """p-values (runs, 2, 3) of the means of pairs of pictures: of pixels alike, and of weighted ones."""
     pairs = ([noisy(rng, draw) for draw in (first, second)] for _ in range(runs))
     return np.array(
-        [_p_of_mean(*(_estimate(each, each.rgb.astype(float)) for each in pair)) for pair in pairs]
+        [_p_of_mean(*(_estimate(each, each.rgb.astype(float), 1) for each in pair)) for pair in pairs]
     )
 
 
@@ -140,7 +140,7 @@ def test_weights_find_what_few_noisy_pixels_hide() -> None:
     rng = np.random.default_rng(5)
     a, b = noisy(rng, noisy_in_a_corner, 16, 32), noisy(rng, noisy_in_a_corner, 16, 32)
     assert wf.compare(a, b).p_mean > 0.01
-    found = _p_of_mean(*(_estimate(each, each.rgb.astype(float)) for each in (1.01 * a, b)))
+    found = _p_of_mean(*(_estimate(each, each.rgb.astype(float), 1) for each in (1.01 * a, b)))
     assert (found[1] < 1e-6).all()
     assert found[0].min() > 1e-3
     assert wf.compare(1.01 * a, b).p_mean < 1e-5
@@ -149,7 +149,8 @@ def test_weights_find_what_few_noisy_pixels_hide() -> None:
 def test_pictures_with_unequal_samples_have_the_errors_of_batches() -> None:
     rng = np.random.default_rng(6)
     a, b = (
-        _estimate(each, each.rgb.astype(float)) for each in (noisy(rng, gaussian, 64), noisy(rng, gaussian))
+        _estimate(each, each.rgb.astype(float), 1)
+        for each in (noisy(rng, gaussian, 64), noisy(rng, gaussian))
     )
     assert _p_of_mean(a, b).shape == (1, 1, 3)
 

@@ -224,7 +224,8 @@ def _tested(
     if absent:
         return None, absent, ""
     shared, factor = _shared(a, b)
-    return significance(_estimate(a, left, factor), _estimate(b, right, factor)), "", shared
+    estimates = _estimate(a, left, factor), _estimate(b, right, factor)
+    return significance(*estimates, independent=not shared), "", shared
 
 
 def _shared(a: Image | ArrayLike, b: Image | ArrayLike) -> tuple[str, float]:

@@ -56,17 +56,20 @@ class Significance:
         return sidak(min(self.pixels, self.blocks, self.mean), 3)
 
 
-def significance(a: Estimate, b: Estimate) -> Significance:
-    """Test whether two pictures, estimates (H, W, 3), have the same mean at each of three levels."""
+def significance(a: Estimate, b: Estimate, independent: bool = True) -> Significance:
+    """Test whether two pictures, estimates (H, W, 3), have the same mean at each of three levels.
+
+    Pictures that are not independent are tested by the errors of the estimates alone.
+    """
     blocks = [p_values(_averaged(a, side), _averaged(b, side)) for side in BLOCKS]
     return Significance(
         corrected(p_values(_cautious(a), _cautious(b))),
         corrected(np.concatenate([p.ravel() for p in blocks])),
-        corrected(_p_of_mean(a, b)),
+        corrected(_p_of_mean(a, b, independent)),
     )
 
 
-def _p_of_mean(a: Estimate, b: Estimate) -> Doubles:
+def _p_of_mean(a: Estimate, b: Estimate, independent: bool = True) -> Doubles:
     """Return the p-values (k, 3) of the difference of the means of whole pictures, of k tests.
 
     Pixels are the samples: their differences are independent, and the mean of each is 0 if the pictures are
@@ -80,7 +83,7 @@ def _p_of_mean(a: Estimate, b: Estimate) -> Doubles:
     weight of each pixel comes from the variances of those around it: it is independent of the pixel's own
     difference, so the mean of their product is 0 likewise, for pictures of whatever noise.
     """
-    if not _are_alike(a, b):
+    if not (independent and _are_alike(a, b)):
         side = max(a.mean.shape[:2])
         return p_values(_averaged(a, side), _averaged(b, side))
     tile = _common_tiles(a, b)
