@@ -27,6 +27,7 @@ from .readers import LoadOptions, mesh_reader, read
 from .sources import LoadLimits, PathLike, SceneFiles, checked_limits, folders
 
 T = TypeVar("T")
+ALL_OF_THE_LIGHT = (".xml", ".pbrt", ".xml.gz", ".pbrt.gz")  # scenes of renderers, which show no other light
 
 
 @suggests_keywords
@@ -102,6 +103,8 @@ def load(
             medium=contents.medium,
         )
         scene.losses = losses.found
+        if not os.fspath(path).lower().endswith(ALL_OF_THE_LIGHT):
+            scene.lights_of_file = [id(each) for each in scene.lights]
         return scene
 
 

@@ -111,6 +111,7 @@ class Scene(Answers):
         self.settings = dict(settings or {})
         self.medium = medium
         self.losses: tuple[Loss, ...] = ()  # what of its file it does not show as the file says
+        self.lights_of_file: list[int] | None = None  # their ids, where it was read from a file
         self.accelerators = AcceleratorCache()  # of the last render, for the next one
         self.check()
 
@@ -216,6 +217,11 @@ class Scene(Answers):
         alone = [shape.bounds for shape in self.shapes if not isinstance(shape, Instance)]
         boxes = np.concatenate([np.array(alone).reshape(-1, 2, 3), instance_bounds(instances)])
         return np.stack([boxes[:, 0].min(0), boxes[:, 1].max(0)])
+
+    @property
+    def has_lights_of_file(self) -> bool:
+        """True if it was read from a file that need not say all of the light, and has its lights."""
+        return self.lights_of_file is not None and self.lights_of_file == [id(each) for each in self.lights]
 
     @property
     def emits(self) -> bool:

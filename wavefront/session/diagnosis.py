@@ -24,6 +24,7 @@ from ..shapes import Instance, Shape
 from ..stages.alpha import covering_hits
 from ..stages.interaction import interaction, origin_above
 from ..stages.intersect import intersect, shadow_rays, visible
+from .final_checks import DIM, dim_blocks
 from .prepared_scene import PreparedScene
 
 GRID = 16  # rays across the picture and down
@@ -39,7 +40,13 @@ def warn_of_black_or_white(
     """
     brightest, darkest = float(image.rgb.max()), float(image.rgb.min())
     probe = VisibilityProbe(scene, view, integrator, max_bounces)
-    if darkest > 1:
+    if brightest >= DIM and darkest <= 1:
+        if probe.mostly_dim(dim_blocks(image)):
+            warn_caller(
+                "the picture is almost black: so is more than half of what the camera sees; "
+                "lighting='studio' adds light, and save(..., exposure=...) shows dark parts"
+            )
+    elif darkest > 1:
         warn_caller(f"the picture is white: {probe.why_white(darkest)}")
     elif brightest > 0:
         stops = int(np.ceil(np.log2(0.5 / brightest)))
@@ -57,6 +64,14 @@ class VisibilityProbe:
     def __init__(self, scene: PreparedScene, view: Camera, integrator: str, max_bounces: int) -> None:
         self._scene, self._compiled, self._view = scene.lighted, scene.compiled, view
         self._integrator, self._max_bounces = integrator, max_bounces
+
+    def mostly_dim(self, blocks: Bools) -> bool:
+        """Return whether most of the blocks (n, n) of a picture that show shapes are dim."""
+        met = self._met[1].found  # of a grid of rays, row by row
+        side = len(blocks)
+        row, column = np.divmod(met, GRID)
+        dim = blocks[row * side // GRID, column * side // GRID]
+        return bool(len(dim)) and bool(dim.mean() > 0.5)
 
     @property
     def lights_are_off(self) -> bool:

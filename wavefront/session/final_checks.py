@@ -7,6 +7,7 @@ from contextlib import contextmanager
 
 import numpy as np
 
+from ..arrays.vec import Bools
 from ..core.errors import Interrupted, RenderError, warn_caller
 from ..core.plural import plural
 from ..image import Image
@@ -19,6 +20,8 @@ LONG_PATH = 1000  # surfaces along a path, after which it will hardly end by its
 FEWEST_PIXELS = 256  # smaller pictures are measurements and are not checked for being black or white
 MUCH_LIGHT = 0.02  # part of the picture's light
 DIM = 1e-3  # radiance below which a picture looks black
+BLOCKS, BLOCK_SAMPLES = 8, 256  # parts of a picture along its sides, and samples of each that make it known
+MANY_DIM = 0.25  # part of the blocks, of which others may show no shape
 
 
 @contextmanager
@@ -105,10 +108,24 @@ def check_last_image(image: Image, plan: Plan, loop: RenderLoop, surfaces: int) 
 
 
 def _is_black_or_white(image: Image) -> bool:
-    """Return whether every pixel is black or almost, or every pixel is above 1."""
+    """Return whether every pixel is black or almost, or may be for the most part, or every one is above 1."""
     if image.rgb.shape[0] * image.rgb.shape[1] < FEWEST_PIXELS:
         return False
-    return bool(image.rgb.max() < DIM or image.rgb.min() > 1)
+    return bool(image.rgb.max() < DIM or image.rgb.min() > 1 or dim_blocks(image).mean() > MANY_DIM)
+
+
+def dim_blocks(image: Image) -> Bools:
+    """Return which of BLOCKS × BLOCKS parts of a picture are almost black; none where that may be noise."""
+    height, width = image.rgb.shape[:2]
+    brightest = image.rgb.max(2)
+    sums = brightest.astype(np.float64)
+    for axis, side in ((0, height), (1, width)):
+        edges = np.arange(BLOCKS) * side // BLOCKS
+        sums = np.add.reduceat(sums, edges, axis=axis)
+    pixels = brightest.size / BLOCKS**2
+    if pixels < 1 or pixels * image.metadata["spp"] < BLOCK_SAMPLES:
+        return np.zeros((BLOCKS, BLOCKS), np.bool_)
+    return np.asarray(sums < DIM * pixels)
 
 
 def _check_first_samples(image: Image, seconds: float | None, surfaces: int) -> None:

@@ -14,9 +14,10 @@ from ..integrators import INTEGRATORS, WITH_MIS
 from ..lights import DirectionalLight, Environment
 from ..media import Medium
 from ..scene import Scene
-from ..scene.lighting import choose_ground, choose_preset, lighted
+from ..scene.lighting import DEFAULT, choose_ground, choose_preset, lighted
 from ..settings import AUTO, Settings
 from ..settings.combinations import MEDIA, check_combinations
+from .own_light import needs_preset
 from .resuming import scene_fingerprint
 
 
@@ -28,6 +29,8 @@ class PreparedScene:
     scene
         The user's.
     settings
+        Of the render.
+    camera
         Of the render.
     framed
         The camera, if it was made to frame the scene.
@@ -48,10 +51,12 @@ class PreparedScene:
         Names and ids of its shapes.
     """
 
-    def __init__(self, scene: Scene, settings: Settings, framed: Camera | None) -> None:
+    def __init__(self, scene: Scene, settings: Settings, camera: Camera, framed: Camera | None) -> None:
         self.scene = scene
         values = settings.values
         self.preset, up = choose_preset(scene, values["lighting"]), scene.vertical(values["up"])
+        if values["lighting"] == AUTO and self.preset is None and needs_preset(scene, settings, camera):
+            self.preset = DEFAULT
         chosen = values["lighting"] == AUTO and self.preset is not None
         self.ground = choose_ground(values["ground"], chosen, framed, values["background"], up)
         self.lighted = lighted(scene, self.preset, ground=self.ground, up=up, camera=framed)
