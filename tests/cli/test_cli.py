@@ -219,6 +219,7 @@ def test_a_view_frames_a_file_with_a_camera(gltf, fast, option):
     np.testing.assert_array_equal(picture, expected.rgb)
 
 
+@pytest.mark.filterwarnings("ignore:the lights of the file")  # lamps that shine away from the camera
 @pytest.mark.parametrize("up", ["0,0,1", "-Z"])
 def test_up_and_direction_frame_a_scene(obj, fast, up):
     output, options = fast

@@ -78,6 +78,7 @@ EXTRAS = {
     "viewer": Extra(("viser",), "wf.view and wavefront view: a scene in the browser"),
     "nrrd": Extra(("pynrrd",), "load_grid: grids of NRRD for media"),
     "vti": Extra(("vtk",), "load_grid: grids of VTK, ImageData, for media"),
+    "pyvista": Extra(("pyvista",), "data.wavefront.render(...) and plotter.wavefront.render(...)"),
     "completion": Extra(("shtab",), "completion of this command line in bash and zsh"),
 }
 

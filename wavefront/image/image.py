@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ..arrays.vec import Bools, Doubles, Floats
-from ..camera import Camera
+from ..camera import Camera, ImageSize
 from ..codecs import png_jpeg
 from ..codecs.display import Display
 from ..codecs.image_data import ERROR, ImageData
@@ -49,6 +49,7 @@ from ..statistics import (
     scatter_of_difference,
 )
 from ..statistics.scatter import PREFIX as SCATTER
+from .framing import cropped, resized
 from .outlines import outline_coverage
 
 MEASURED = "measured."  # before the names of such arrays in files
@@ -450,6 +451,49 @@ class Image(Answers):
 
     __rmul__ = __mul__
 
+    def crop(self, window: tuple[int, int, int, int]) -> Image:
+        """Return a part of the picture, with all that is known of its pixels but the sums for `merge`.
+
+        Parameters
+        ----------
+        window
+            (x0, y0, x1, y1) in pixels from the left and the top; column x1 and row y1 are no part of it.
+
+        Raises
+        ------
+        SceneError
+            If it is malformed, empty, or leaves the picture.
+
+        Examples
+        --------
+        >>> image = wf.render([wf.Sphere((0, 0, 0), 1), wf.Environment(1)], 2, size=(32, 24))
+        >>> image.crop((4, 2, 20, 12)).shape
+        (10, 16, 3)
+        """
+        return cropped(self, window)
+
+    def resize(self, size: ImageSize) -> Image:
+        """Return the colors in another size: each pixel is the mean of the area that it covers.
+
+        What is known of single pixels, such as errors and AOVs, is left out.
+
+        Parameters
+        ----------
+        size
+            (width, height) in pixels, or one number for both.
+
+        Raises
+        ------
+        SceneError
+            If it is malformed.
+
+        Examples
+        --------
+        >>> wf.Image(np.ones((24, 32, 3), np.float32)).resize((8, 6)).shape
+        (6, 8, 3)
+        """
+        return resized(self, size)
+
     @suggests_keywords
     def denoise(self, denoiser: str = "auto") -> Image:
         """Return the picture without most of its noise.
@@ -769,7 +813,7 @@ class Image(Answers):
         write_image(path, self._data(), Display(gamma, exposure, tone, white_balance), bits)
 
     @suggests_keywords
-    def plot(self, name: str = "rgb", axes: Any = None) -> Any:
+    def plot(self, name: str = "rgb", axes: Any = None, *, cmap: Any = "viridis") -> Any:
         """Plot the picture or an AOV with matplotlib.
 
         AOVs of one number per pixel are shown in false color with a color bar, ids in distinct colors with
@@ -781,6 +825,8 @@ class Image(Answers):
             "rgb", "luminance" (cd/m²), an AOV, or "counts", "variance" or "standard_error".
         axes
             Axes of matplotlib to draw into; by default those of a new figure.
+        cmap
+            The colormap of AOVs of one number: the name of one of matplotlib, or a colormap.
 
         Returns
         -------
@@ -801,7 +847,7 @@ class Image(Answers):
             raise SceneError(f"plot: the image has no layer {name!r}; render it with aovs=({name!r},)")
         values = arrays[one_of("layer", name, arrays)]
         table = self.names.get(name.removesuffix("_id"), {}) if name.endswith("_id") else None
-        return plot.draw(name, self.to_uint8()[..., :3] if name == "rgb" else values, table, axes)
+        return plot.draw(name, self.to_uint8()[..., :3] if name == "rgb" else values, table, axes, cmap)
 
     @suggests_keywords
     def false_color(
@@ -811,6 +857,7 @@ class Image(Answers):
         log: bool = True,
         efficacy: float = EFFICACY,
         axes: Any = None,
+        cmap: Any = "viridis",
     ) -> Any:
         """Plot the luminance in false color, with a scale in cd/m², with matplotlib; return the axes.
 
@@ -824,6 +871,8 @@ class Image(Answers):
             lm/W of white, as in `to_photometric`.
         axes
             Axes of matplotlib to draw into; by default those of a new figure.
+        cmap
+            As for `plot`.
 
         Raises
         ------
@@ -848,7 +897,7 @@ class Image(Answers):
         if not low < high or (log and low <= 0):
             least = " and be above 0" if log else ""
             raise SceneError(f"false_color limits are {low:g} and {high:g}; they must increase{least}")
-        return plot.draw_scale("luminance", "cd/m²", values, (low, high), log, axes)
+        return plot.draw_scale("luminance", "cd/m²", values, (low, high), log, axes, cmap)
 
     def _data(self) -> ImageData:
         """Return all of the image as files hold it."""

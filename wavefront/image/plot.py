@@ -18,7 +18,7 @@ MOST_NAMES = 20  # in a legend: those of the largest areas
 FILL = 0.85  # gray where an AOV has no value
 
 
-def draw(name: str, values: NDArray[Any], names: Mapping[int, str] | None, axes: Any) -> Any:
+def draw(name: str, values: NDArray[Any], names: Mapping[int, str] | None, axes: Any, cmap: Any) -> Any:
     """Draw an AOV, and return the axes.
 
     Parameters
@@ -31,6 +31,8 @@ def draw(name: str, values: NDArray[Any], names: Mapping[int, str] | None, axes:
         Of ids, if the AOV holds ids.
     axes
         Axes of matplotlib, or None for new ones.
+    cmap
+        Colormap of numbers.
     """
     pyplot = import_pyplot()
     axes = pyplot.subplots()[1] if axes is None else axes
@@ -39,7 +41,7 @@ def draw(name: str, values: NDArray[Any], names: Mapping[int, str] | None, axes:
     if names is not None:
         _draw_ids(axes, values, names)
     elif values.ndim == 2:
-        picture = axes.imshow(values, cmap="viridis", interpolation="nearest")
+        picture = axes.imshow(values, cmap=cmap, interpolation="nearest")
         axes.figure.colorbar(picture, ax=axes)
     else:
         axes.imshow(aov_colors(name, values), interpolation="nearest")
@@ -47,7 +49,7 @@ def draw(name: str, values: NDArray[Any], names: Mapping[int, str] | None, axes:
 
 
 def draw_scale(
-    name: str, unit: str, values: NDArray[Any], limits: tuple[float, float], log: bool, axes: Any
+    name: str, unit: str, values: NDArray[Any], limits: tuple[float, float], log: bool, axes: Any, cmap: Any
 ) -> Any:
     """Draw numbers (H, W) between limits in false color, with a scale in a unit, and return the axes."""
     pyplot = import_pyplot()
@@ -57,7 +59,7 @@ def draw_scale(
     axes.set_title(name)
     axes.set_axis_off()
     scale = (LogNorm if log else Normalize)(*limits, clip=True)
-    picture = axes.imshow(np.fmax(values, limits[0]), cmap="viridis", norm=scale, interpolation="nearest")
+    picture = axes.imshow(np.fmax(values, limits[0]), cmap=cmap, norm=scale, interpolation="nearest")
     axes.figure.colorbar(picture, ax=axes, label=unit)
     return axes
 

@@ -192,7 +192,8 @@ def _is_mesh(subject: Any) -> bool:
     """Return True for (vertices, faces) or (vertices, faces, normals), as a tuple or a list."""
     if not isinstance(subject, tuple | list) or len(subject) not in (2, 3):
         return False
-    return all(_is_table(part) for part in subject)
+    whole = isinstance(subject, tuple)  # also where one of them is empty, which the mesh says
+    return all(_is_table(part) or (whole and part == []) for part in subject)
 
 
 def _is_table(part: Any) -> bool:

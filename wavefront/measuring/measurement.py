@@ -352,7 +352,13 @@ class Measurement(Answers):
 
     @suggests_keywords
     def plot(
-        self, levels: int = 8, axes: Any = None, label: str | None = None, *, unit: str = "watts"
+        self,
+        levels: int = 8,
+        axes: Any = None,
+        label: str | None = None,
+        *,
+        unit: str = "watts",
+        cmap: Any = "viridis",
     ) -> Any:
         """Plot the values with matplotlib: false color and isolines over a plane of points.
 
@@ -366,6 +372,8 @@ class Measurement(Answers):
             What the scale of colors says; by default what is measured, and its unit.
         unit
             "watts" for the luminance of the values, 0.2126 R + 0.7152 G + 0.0722 B; "lux" for `lux`.
+        cmap
+            A colormap of matplotlib, or its name.
 
         Returns
         -------
@@ -381,7 +389,7 @@ class Measurement(Answers):
         """
         from .plot import draw
 
-        return draw(self, levels, axes, label, unit)
+        return draw(self, levels, axes, label, unit, cmap)
 
 
 def file_kind(path: str | os.PathLike[str]) -> str:

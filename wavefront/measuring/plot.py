@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from .measurement import Measurement
 
 
-def draw(found: Measurement, levels: int, axes: Any, label: str | None, unit: str) -> Any:
+def draw(found: Measurement, levels: int, axes: Any, label: str | None, unit: str, cmap: Any) -> Any:
     """Draw a measurement over the two axes along which its points are spread most, and return the axes."""
     pyplot = import_pyplot()
     across, up = np.sort(np.argsort(-np.ptp(found.points, axis=0), kind="stable")[:2])
@@ -24,7 +24,7 @@ def draw(found: Measurement, levels: int, axes: Any, label: str | None, unit: st
         raise SceneError("plot: the points are on one line; they must cover a plane")
     value = found.lux if one_of("unit", unit, ("watts", "lux")) == "lux" else luminance(found.value.T)
     axes = pyplot.subplots()[1] if axes is None else axes
-    filled = axes.tricontourf(x, y, value, 64, cmap="viridis")
+    filled = axes.tricontourf(x, y, value, 64, cmap=cmap)
     if np.ptp(value) > 0:
         axes.clabel(axes.tricontour(x, y, value, levels, colors="white", linewidths=0.7), fontsize="small")
     axes.figure.colorbar(filled, ax=axes, label=label or f"{found.kind}, {_unit(found, unit)}")

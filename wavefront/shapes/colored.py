@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 from numpy.typing import ArrayLike
 
 from ..arrays.vec import Doubles, f4
 from ..bsdfs import Diffuse
 from ..colors import named_rows, srgb_to_linear, warn_of_colormap
+from ..colors.maps import color_map, numeric
 from ..core.errors import SceneError, exact, finite_array
 from ..core.plural import plural
 from ..materials import Material
@@ -37,6 +40,22 @@ def linear_colors(name: str, values: ArrayLike | None) -> Doubles | None:
     if codes is not None:
         warn_of_colormap(name, np.asarray(values))
     return array if array.shape[1] == 4 else np.column_stack([array, np.ones(len(array))])
+
+
+def mapped_colors(name: str, values: Any, cmap: Any, clim: Any) -> Any:
+    """Return the colors of a colormap for numbers (n,), or `values` themselves where none is given.
+
+    Raises
+    ------
+    SceneError
+        If they are not one number each.
+    """
+    if cmap is None and clim is None:
+        return values
+    if values is None:
+        raise SceneError(f"{name}: cmap and clim are for colors=..., one number each")
+    numbers = numeric(f"{name}: colors", values)
+    return color_map(f"{name}: colors", numbers, cmap, clim).colors(numbers)
 
 
 class ColoredShape(Shape):

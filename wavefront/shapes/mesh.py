@@ -16,7 +16,7 @@ from ..core.suggestions import suggests_keywords
 from ..materials import Material, MaterialLike
 from ..textures.parameter import Color, color
 from .base import Checked
-from .colored import ColoredShape
+from .colored import ColoredShape, mapped_colors
 from .smoothing import AUTO, CREASE, check_smooth, crease_normals, facet_normals, split_vertices
 from .transform import moved, moved_tangents
 from .winding import settled
@@ -119,6 +119,10 @@ class Mesh(ColoredShape):
         Vertices at one position count as one. Vertices on creases are split, so that the mesh may have more
         of them. Not with `normals`.
 
+    cmap, clim
+        Then `colors` are numbers, one each, that a colormap of matplotlib shows, by its name, such as
+        "viridis"; and the numbers at its ends, by default the least and the greatest.
+
     Arrays are copied: later changes to them do not change the mesh.
 
     Raises
@@ -158,6 +162,8 @@ class Mesh(ColoredShape):
         two_sided: bool = False,
         name: str = "mesh",
         smooth: bool | float | str = False,
+        cmap: Any = None,
+        clim: ArrayLike | None = None,
     ) -> None:
         self.name = name
         self.vertices = vertices
@@ -165,7 +171,7 @@ class Mesh(ColoredShape):
         self.normals = normals
         self.uvs, self.uvs1 = uvs, uvs1
         self.tangents = tangents
-        self.colors = colors
+        self.colors = mapped_colors(name, colors, cmap, clim)
         self.check()
         if self.normals is not None and self.tangents is None:
             self.faces, self.normals = settled(name, self.vertices, self.faces, self.normals)

@@ -29,6 +29,8 @@ def Points(
     *,
     material: MaterialLike | None = None,
     name: str = "points",
+    cmap: Any = None,
+    clim: ArrayLike | None = None,
 ) -> Spheres:
     """Return a sphere at each point.
 
@@ -42,7 +44,7 @@ def Points(
         nearest neighbor, so that spheres on a grid touch; a warning states it.
     colors
         (n, 3) or (n, 4), as of `Spheres`.
-    material, name
+    material, name, cmap, clim
         As for `Spheres`.
 
     Raises
@@ -52,6 +54,8 @@ def Points(
 
     Examples
     --------
+    >>> points = np.random.default_rng(1).random((100, 3))
+    >>> by_height = wf.Points(points, radius=0.01, colors=points[:, 2], cmap="viridis")
     >>> cloud = wf.Points(np.random.default_rng(1).random((100, 3)), radius=0.01)
     """
     places, given = cloud_arrays(points)
@@ -60,7 +64,7 @@ def Points(
     if radius is None:
         radius = usual_radius(places)
         warn_caller(f"{name}: {len(places)} points are shown as spheres of radius {radius:.3g}")
-    return Spheres(places, radius, colors, material=material, name=name)
+    return Spheres(places, radius, colors, material=material, name=name, cmap=cmap, clim=clim)
 
 
 @suggests_keywords

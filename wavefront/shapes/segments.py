@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from copy import copy
-from typing import Self
+from typing import Any, Self
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -17,6 +17,7 @@ from ..core.suggestions import suggests_keywords
 from ..materials import MaterialLike
 from .arrays import PrimitiveArray
 from .base import Checked
+from .colored import mapped_colors
 from .mesh import positions
 
 HULL_SIDES = 16  # of the polygons about the ends of cylinders
@@ -110,6 +111,9 @@ class Cylinders(SegmentArray):
         or is gray. The outside is the front. Cylinders cannot emit light.
     name
         Used in messages.
+    cmap, clim
+        Then `colors` are numbers, one each, that a colormap of matplotlib shows, by its name, such as
+        "viridis"; and the numbers at its ends, by default the least and the greatest.
 
     Raises
     ------
@@ -139,9 +143,11 @@ class Cylinders(SegmentArray):
         caps: bool = True,
         material: MaterialLike | None = None,
         name: str = "cylinders",
+        cmap: Any = None,
+        clim: ArrayLike | None = None,
     ) -> None:
         self.caps = bool(caps)
-        super().__init__(starts, ends, radii, colors, material, name)
+        super().__init__(starts, ends, radii, mapped_colors(name, colors, cmap, clim), material, name)
 
     def _reach(self) -> Doubles:
         """Return how far flat ends reach, (n, 3): the radius, times the sine of axis and coordinate axis."""
@@ -196,6 +202,9 @@ class Capsules(SegmentArray):
         or is gray. The outside is the front. Capsules cannot emit light.
     name
         Used in messages.
+    cmap, clim
+        Then `colors` are numbers, one each, that a colormap of matplotlib shows, by its name, such as
+        "viridis"; and the numbers at its ends, by default the least and the greatest.
 
     Raises
     ------
@@ -222,5 +231,7 @@ class Capsules(SegmentArray):
         *,
         material: MaterialLike | None = None,
         name: str = "capsules",
+        cmap: Any = None,
+        clim: ArrayLike | None = None,
     ) -> None:
-        super().__init__(starts, ends, radii, colors, material, name)
+        super().__init__(starts, ends, radii, mapped_colors(name, colors, cmap, clim), material, name)

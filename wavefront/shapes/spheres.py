@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from copy import copy
-from typing import Self
+from typing import Any, Self
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -14,6 +14,7 @@ from ..materials import MaterialLike
 from ..textures.parameter import Color
 from .arrays import PrimitiveArray
 from .base import Checked
+from .colored import mapped_colors
 from .mesh import positions
 from .sphere_emission import SphereEmission
 
@@ -38,6 +39,9 @@ class Spheres(SphereEmission, PrimitiveArray):
         the `colors`; it leaves the surfaces on both sides. By default that of the material, if it has one.
     name
         Used in messages.
+    cmap, clim
+        Then `colors` are numbers, one each, that a colormap of matplotlib shows, by its name, such as
+        "viridis"; and the numbers at its ends, by default the least and the greatest.
 
     Raises
     ------
@@ -65,10 +69,12 @@ class Spheres(SphereEmission, PrimitiveArray):
         material: MaterialLike | None = None,
         emission: Color | None = None,
         name: str = "spheres",
+        cmap: Any = None,
+        clim: ArrayLike | None = None,
     ) -> None:
         self.name = name
         self.centers = centers
-        super().__init__(radii, colors, material, name)
+        super().__init__(radii, mapped_colors(name, colors, cmap, clim), material, name)
         self.emission = emission
 
     @property
