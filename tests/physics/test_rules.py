@@ -453,3 +453,37 @@ def test_media_of_both_kinds_beside_each_other(glow: float) -> None:
     scene = wf.Scene(shapes, wf.PointLight((0, 2, 0), 10), probe(HERE, (0.31, 0.17, 0.23)))
     expected = 2.5 * ALBEDO / np.pi * np.exp(-0.5 * 0.5 - 0.4)
     assert_mean(measure(scene, 64, max_bounces=1), expected, 0.01, rounding=1e-4)
+
+
+# --- Sensors ------------------------------------------------------------------------------------------
+
+
+def radiance(scene: wf.Scene, direction: tuple[float, float, float]) -> float:
+    """What is seen from (0, 1, 0)."""
+    found = wf.measure(scene, [(0, 1, 0)], [direction], kind="radiance", spp=1, workers=1, progress=False)
+    return float(found.value[0, 0])
+
+
+def test_sensors_meet_what_cameras_do_not_see() -> None:
+    """They measure the light that is there: no rule about what a camera sees is theirs."""
+    unseen = wf.Material(BLACK, emission=1, visible_to_camera=False)
+    lamp = wf.Sphere((0, 0, 2), 0.5, material=unseen)
+    power = wf.measure_flux([lamp], lamp, kind="leaving", spp=4, max_bounces=0, workers=1, progress=False)
+    np.testing.assert_allclose(power.value, np.pi * 4 * np.pi * 0.5**2, rtol=1e-5)
+    roof = floor(wf.Material(BLACK, visible_to_camera=False), y=3.0)
+    assert radiance(wf.Scene([roof], wf.Environment(1)), (0, 1, 0)) == 0
+    catcher = wf.Scene([floor(wf.ShadowCatcher(ALBEDO))], wf.PointLight((0, 2, 0), 10))
+    assert radiance(catcher, (0, -1, 0)) == pytest.approx(2.5 * ALBEDO / np.pi, rel=1e-5)
+    sky = wf.Scene([roof], wf.Environment(1, backdrop=0.1))
+    assert radiance(sky, (0, -1, 0)) == pytest.approx(1, rel=1e-5)
+
+
+def test_roofs_that_cameras_do_not_see_hide_the_sun() -> None:
+    noon, patches = wf.Weather([1], [1], [(0, 1, 0)]), SkyPatches.of(1, np.eye(3)[:, [2, 0, 1]])
+    points, normals = np.array([(0.0, 0, 0), (5, 0, 0)]), np.array([(0.0, 1, 0)] * 2)
+    nothing = np.zeros((8, 2, len(patches)))
+    for visible in (True, False):
+        roof = floor(wf.Material(BLACK, visible_to_camera=visible), half=1.0, y=1.0)
+        scene = wf.Scene([roof], PatchedEnvironment(np.ones((3, 1), f4), patches=patches))
+        found = wf.DaylightCoefficients(scene, points, normals, patches, nothing, nothing)
+        assert found.sunlight(noon)[:, 0].tolist() == [0, 1]

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 
 import numpy as np
 
@@ -106,6 +107,12 @@ class CompiledScene:
         """
         check_distance("Camera origin", camera.origin, self.center / self.scale, self.scale)
         return camera.scaled(self.scale)
+
+    def seen_by(self, camera: Camera) -> CompiledScene:
+        """Return the scene as the first rays of a camera meet it: sensors measure the light that is there."""
+        if camera.sensor is None:
+            return self
+        return replace(self, unseen=None, shadow_catchers=None, background=None, backdrop=None)
 
 
 def compile_scene(

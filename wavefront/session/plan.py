@@ -43,7 +43,7 @@ def trained_guide(settings: Settings, scene: PreparedScene, camera: Camera) -> G
     if not settings.values["guide"] or not settings.is_full:
         return None
     with phase("learning where light comes from", settings.values["progress"]), single_threaded_blas:
-        return learn_guide(settings, scene.compiled, scene.compiled.view(camera))
+        return learn_guide(settings, scene.compiled.seen_by(camera), scene.compiled.view(camera))
 
 
 def with_choice(plan: Plan, camera: Camera, run: JobsRunner) -> Plan:
@@ -60,7 +60,7 @@ def with_choice(plan: Plan, camera: Camera, run: JobsRunner) -> Plan:
 def make_plan(settings: Settings, scene: PreparedScene, camera: Camera, table: GuideTable | None) -> Plan:
     """Return how the view of a camera is rendered, given what may guide its paths."""
     tracer = Tracer(
-        scene.compiled,
+        scene.compiled.seen_by(camera),
         settings.sampler_maker(),
         settings.values["seed"],
         FILTERS.find(settings.values["filter"]),
