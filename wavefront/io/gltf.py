@@ -52,10 +52,12 @@ def contents(document: Document) -> GltfContents:
     out, nodes = GltfContents(), walk(document)
     meshes = _Meshes(document, {node.index: node.matrix for node in nodes})
     for node in nodes:
-        if node.shown and "mesh" in node.json:
+        if not node.shown:
+            continue
+        if "mesh" in node.json:
             with document.part(f"nodes[{node.index}]"):
                 meshes.place(node)
-        if node.shown and len(node.json.keys() & {"camera", "extensions"}):
+        if "camera" in node.json or "extensions" in node.json:
             _add_others(document, out, node)
     if len(document.items("scenes")) > 1:
         document.lose("further scenes", "the file")
@@ -107,9 +109,10 @@ class _Meshes:
             raise LimitError(f"its nodes place {total} meshes so far; the limit is {most}")
         self._of += parts * len(matrices)
         self._names += _names_of_parts(node, len(parts)) * len(matrices)
-        at = np.repeat(matrices, len(parts), 0).reshape(-1, len(parts), 4, 4)
-        at[:, [part in self._skinned for part in parts]] = IDENTITY
-        self._where.append(at.reshape(-1, 4, 4))
+        where = matrices.repeat(len(parts), 0)
+        if self._skinned:  # whose joints place them
+            where[[part in self._skinned for part in parts] * len(matrices)] = IDENTITY
+        self._where.append(where)
 
     def places(self) -> Places:
         """Return the placements; the walk meets the last node first, as trimesh does."""
@@ -120,6 +123,8 @@ class _Meshes:
     def _placements(self, node: Node, parts: list[int]) -> Matrix:
         """Return the matrices (n, 4, 4) of the instances of a node."""
         document = self._document
+        if "extensions" not in node.json:
+            return node.matrix[None]
         with document.part(f"nodes[{node.index}].{INSTANCING}", "the mesh once in its place"):
             count = count_placements(document, node)
             if len(self._of) + count * len(parts) > document.files.limits.instances:
@@ -148,6 +153,8 @@ class _Meshes:
         """Return the mesh of a primitive at rest."""
         document, skin, count = self._document, self._skin(node), len(part.bend.targets)
         weights = np.zeros(count)
+        if skin is None and not count:
+            return part.raw
         if count:
             with document.part(f"nodes[{node.index}].weights", "0 in their place"):
                 mesh = document.get("meshes", node.json["mesh"])

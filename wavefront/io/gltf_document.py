@@ -23,7 +23,7 @@ from ..core.errors import LimitError, SceneError, printable
 from ..core.plural import plural
 from ..shapes.transform import Matrix
 from .gltf_compression import MESHOPT, unpacked_view
-from .losses import Losses
+from .losses import Losses, Part
 from .sources import MAX_TRIANGLES, SceneFiles
 
 COMPONENTS: dict[int, type[np.generic]] = {
@@ -73,17 +73,9 @@ class Document:
         elif not str(version).startswith("2"):
             raise SceneError(f"{self.name}: is glTF version {shown(version)}; only version 2 is read")
 
-    @contextmanager
-    def part(self, element: str, done: str = "left out") -> Iterator[None]:
-        """Note an error of the block, which reads an element, and go on; `done` is what was done instead.
-
-        Raises
-        ------
-        SceneError
-            If a limit is passed.
-        """
-        with self.files.losses.part(element, done), self.inside(element):
-            yield
+    def part(self, element: str, done: str = "left out") -> Part:
+        """Return a context that notes an error of its block, which reads an element: `Losses.part`."""
+        return self.files.losses.part(element, done, MALFORMED)
 
     def items(self, kind: str) -> list[Any]:
         """Return the array `kind`; an empty one where it is malformed, which is noted."""

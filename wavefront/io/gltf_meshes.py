@@ -18,7 +18,7 @@ from ..core.plural import plural
 from .gltf_compression import DRACO, DracoMesh
 from .gltf_document import Document, normalized
 from .gltf_posing import MORPHED, Bend
-from .repair import Faces, RawMesh, Table, existing, wide
+from .repair import Faces, RawMesh, Table, wide
 
 READ = ("TEXCOORD_0", "TEXCOORD_1", "COLOR_0")  # attributes of a mesh with a number in their name
 TRIANGLES, STRIP, FAN = 4, 5, 6
@@ -110,7 +110,7 @@ class _Reader:
         return DracoMesh(data[start:end], item, document.files.budget, f"{document.name}: {self._place}")
 
     def _faces(self, mode: int) -> Faces:
-        """Return the triangles whose vertices exist."""
+        """Return the triangles."""
         document, where = self._document, self._where
         if self._draco is not None:
             indices, mode = self._draco.indices, TRIANGLES
@@ -124,8 +124,7 @@ class _Reader:
         if beyond:
             there = f"has {plural(len(indices), 'index', 'indices')}; triangles need a multiple of 3"
             document.files.losses.note(there, f"{self._name!r}", done="the last ones are left out")
-        faces = _triangles(where, indices[: len(indices) - beyond], mode, self._count or 0)
-        return faces[existing(document.files.losses, f"{self._name!r}", faces, self._count or 0)]
+        return _triangles(where, indices[: len(indices) - beyond], mode, self._count or 0)
 
     def _values(self, key: str, widths: int | tuple[int, ...]) -> NDArray[Any] | None:
         """Return an attribute of the primitive, None if there is none."""
@@ -138,6 +137,8 @@ class _Reader:
 
     def _read(self, key: str, widths: int | tuple[int, ...]) -> Table | None:
         """Return an attribute that is left out, which is noted, if it is damaged."""
+        if key not in self._attributes:
+            return None
         with self._document.part(f"{self._place}.{key}"):
             values = self._values(key, widths)
             return None if values is None else wide(values)
@@ -146,6 +147,8 @@ class _Reader:
     def _bend(self) -> Bend:
         """Return the morph targets and the joints; what is damaged is noted, and without effect."""
         bend, document = Bend(), self._document
+        if "targets" not in self._part and "JOINTS_0" not in self._attributes:
+            return bend
         with document.part(f"{self._place}.targets"):
             bend.targets = [self._target(*each) for each in enumerate(self._part.get("targets", []))]
         with document.part(f"{self._place}.JOINTS"):

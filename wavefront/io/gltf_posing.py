@@ -57,11 +57,13 @@ def pose(
     matrices
         (4, 4) to the scene of each node that is a joint, by its number in the file.
     """
-    raw = _morphed(raw, bend.targets, weights)
-    if skin is None or bend.joints is None or bend.weights is None:
-        return raw
-    joints = np.array([matrices[node] for node in skin.nodes]).reshape(-1, 4, 4) @ skin.inverse
-    return _skinned(raw, bend.joints, bend.weights, joints)
+    with np.errstate(all="ignore"):  # what is not finite is left out where the mesh is built
+        if weights.any():
+            raw = _morphed(raw, bend.targets, weights)
+        if skin is None or bend.joints is None or bend.weights is None:
+            return raw
+        joints = np.array([matrices[node] for node in skin.nodes]).reshape(-1, 4, 4) @ skin.inverse
+        return _skinned(raw, bend.joints, bend.weights, joints)
 
 
 def held(losses: Losses, place: str, bend: Bend, skin: Skin) -> Bend:
@@ -106,7 +108,8 @@ def _skinned(raw: RawMesh, joints: Ints, weights: Doubles, matrices: Matrix) -> 
     linear, shift = mean[:, :, :3], mean[:, :, 3]
     cofactors = _cofactors(linear)
     side = np.where((linear[:, 0] * cofactors[:, 0]).sum(1) < 0, -1.0, 1.0)  # -1 where it mirrors
-    faces = np.where(side[raw.faces].sum(1, keepdims=True) < 0, raw.faces[:, [0, 2, 1]], raw.faces)
+    turned = side.take(raw.faces, mode="clip").sum(1, keepdims=True) < 0
+    faces = np.where(turned, raw.faces[:, [0, 2, 1]], raw.faces)
     normals, tangents = raw.normals, raw.tangents
     if normals is not None:
         normals = side[:, None] * _turned(cofactors, normals)

@@ -9,8 +9,8 @@ passed, or where an argument of a call is wrong.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
-from contextlib import ExitStack, contextmanager
+from collections.abc import Iterable
+from contextlib import ExitStack
 from typing import Self
 
 import numpy as np
@@ -22,6 +22,34 @@ from ..core.plural import plural
 from ..scene.loss import NOT_HONORED, Loss
 
 MOST_SHOWN = 10  # lines of a message
+MOST_LETTERS = 200  # of a line about malformed data
+
+
+class Part:
+    """A block that reads a part of a file. There may be millions, so it is no generator."""
+
+    __slots__ = ("_done", "_losses", "_malformed", "_place")
+
+    def __init__(self, losses: Losses, place: str, done: str, malformed: tuple[type[Exception], ...]) -> None:
+        self._losses, self._place, self._done, self._malformed = losses, place, done, malformed
+
+    def __enter__(self) -> None:
+        """Begin."""
+
+    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, *_: object) -> bool:
+        """Note an error, unless a limit was passed."""
+        if error is None:
+            return False
+        if isinstance(error, self._malformed) and not isinstance(error, SceneError):
+            name = type(error).__name__
+            what = f"{self._place} is malformed: {name}: {error}"[:MOST_LETTERS]
+        elif isinstance(error, SceneError) and not passed_limit(error):
+            what = str(error).removeprefix(f"{self._losses.name}: ").removeprefix(f"{self._place}: ")
+        else:
+            return False
+        place = self._place
+        self._losses.note(what, "" if place and what.startswith(place) else place, done=self._done)
+        return True
 
 
 class Losses:
@@ -62,22 +90,23 @@ class Losses:
         """Note a warning that begins with its place."""
         self.note(message.removeprefix(f"{self.name}: "), done="")
 
-    @contextmanager
-    def part(self, place: str = "", done: str = "left out") -> Iterator[None]:
-        """Note an error of the block, which reads a part of the file, and go on without that part.
+    def part(
+        self, place: str = "", done: str = "left out", malformed: tuple[type[Exception], ...] = ()
+    ) -> Part:
+        """Return a context that notes an error of its block, which reads a part of the file, and goes on.
 
-        Raises
-        ------
-        SceneError
-            If a limit is passed.
+        A passed limit ends the load.
+
+        Parameters
+        ----------
+        place
+            As of `note`.
+        done
+            What is done without that part.
+        malformed
+            Errors of other types that mean damage, too.
         """
-        try:
-            yield
-        except SceneError as error:
-            if passed_limit(error):
-                raise
-            what = str(error).removeprefix(f"{self.name}: ").removeprefix(f"{place}: ")
-            self.note(what, "" if place and what.startswith(place) else place, done=done)
+        return Part(self, place, done, malformed)
 
     def within(
         self, part: str, value: ArrayLike, low: float = 0.0, high: float = 1.0, place: str = ""

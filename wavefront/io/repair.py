@@ -100,7 +100,8 @@ def build(source: str, raw: RawMesh, losses: Losses) -> Mesh | None:
     there = existing(losses, label, faces, len(vertices))
     if not there.any():
         return None
-    faces = np.where(there[:, None], faces, 0)
+    if not there.all():
+        faces = np.where(there[:, None], faces, 0)
     sound = np.all(np.abs(vertices) <= FLOAT32_MAX, axis=1)  # false for NaN
     vertices = np.where(sound[:, None], vertices, 0.0)
     keep: Bools = there & np.all(sound[faces], axis=1)
@@ -132,13 +133,13 @@ def _label(source: str, raw: RawMesh) -> str:
 
 def existing(losses: Losses, label: str, faces: Faces, count: int) -> Bools:
     """Return a mask of the faces all of whose vertices are among `count`; the others are noted."""
+    if not faces.size or (faces.min() >= 0 and faces.max() < count):
+        return np.ones(len(faces), np.bool_)
     beyond = (faces < 0) | (faces >= count)
-    bad = np.argwhere(beyond)
-    if len(bad):
-        i, j = bad[0]
-        first = f"face {i} uses vertex {faces[i, j]}; it must be in [0, {count - 1}]"
-        found = plural(int(beyond.any(1).sum()), "face")
-        losses.note(f"{found} with a vertex that does not exist, first: {first}", label, done="left out")
+    i, j = np.argwhere(beyond)[0]
+    first = f"face {i} uses vertex {faces[i, j]}; it must be in [0, {count - 1}]"
+    found = plural(int(beyond.any(1).sum()), "face")
+    losses.note(f"{found} with a vertex that does not exist, first: {first}", label, done="left out")
     return np.asarray(~beyond.any(1))
 
 
