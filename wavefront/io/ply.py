@@ -111,6 +111,10 @@ def _faces(files: SceneFiles, rows: dict[str, Rows], points: Doubles) -> Faces:
     return Faces(*map(np.concatenate, zip(NONE, *parts, strict=True)))
 
 
+def _has_strips(rows: dict[str, Rows]) -> bool:
+    return "tristrips" in rows and rows["tristrips"].count > 0
+
+
 def _indices(rows: Rows) -> str | None:
     """Return the name of the list with the indices of vertices; None if there is none."""
     usual = [name for name in ("vertex_index", "vertex_indices") if name in rows.lists]
@@ -138,14 +142,16 @@ def faces_of_rows(losses: Losses, rows: Rows, named: str, points: Doubles) -> Fa
 def _of_strips(losses: Losses, rows: Rows, named: str, points: Doubles) -> Faces:
     """Return the triangles of strips. -1 begins a new one. Degenerate ones are left out."""
     counts, values = rows.lists[named]
+    with np.errstate(all="ignore"):
+        vertices = values.astype(np.intp)
     parts = [NONE]
     for number, strip in enumerate(np.split(np.arange(len(values)), np.cumsum(counts)[:-1])):
-        for run in np.split(strip, np.flatnonzero(values[strip] == -1)):
-            run = run[values[run] != -1]
+        for run in np.split(strip, np.flatnonzero(vertices[strip] == -1)):
+            run = run[vertices[run] != -1]
             if len(run) >= 3:
                 corner = np.stack([run[:-2], run[1:-1], run[2:]], axis=1)
                 corner[1::2] = corner[1::2, [1, 0, 2]]
-                parts.append(Faces(values[corner].astype(np.intp), np.full(len(corner), number), corner))
+                parts.append(Faces(vertices[corner], np.full(len(corner), number), corner))
     triangles, row, corner = map(np.concatenate, zip(*parts, strict=True))
     inside = ((triangles >= 0) & (triangles < len(points))).all(1)
     lost = np.zeros(rows.count, np.bool_)
@@ -158,7 +164,7 @@ def _of_strips(losses: Losses, rows: Rows, named: str, points: Doubles) -> Faces
 def _with_uvs_of_corners(files: SceneFiles, raw: RawMesh, rows: dict[str, Rows], faces: Faces) -> RawMesh:
     """Return a mesh with the texture coordinates that faces have for their corners, if they do."""
     face = rows.get("face")
-    if face is None or "texcoord" not in face.lists or not len(faces.row) or "tristrips" in rows:
+    if face is None or "texcoord" not in face.lists or not len(faces.row) or _has_strips(rows):
         return raw
     counts, values = face.lists["texcoord"]
     corners, _ = face.lists[_indices(face) or ""]
@@ -196,7 +202,7 @@ def _colored(files: SceneFiles, raw: RawMesh, rows: dict[str, Rows], faces: Face
     White ones are defaults of some program. Beside a texture none count.
     """
     of_vertices, of_faces = _colors(rows["vertex"]), _colors(rows.get("face"))
-    if "tristrips" in rows:
+    if _has_strips(rows):
         of_faces = None
     if textured:
         for each, what in ((of_vertices, "vertex"), (of_faces, "face")):
