@@ -8,6 +8,7 @@ import pytest
 
 from wavefront.io.load import load, load_mesh
 from wavefront.io.polygons import fans, fans_by_size, triangulate, turned_fans
+from wavefront.io.pyvista_objects import from_pyvista
 
 L = [(-1, -1), (1, -1), (1, 0), (0, 0), (0, 1), (-1, 1)]
 DART = [(-1, -1), (0, -0.5), (1, -1), (0, 1)]
@@ -337,3 +338,18 @@ def test_damaged_polygons_of_dae(tmp_path, change, message, expected):
     with pytest.warns(UserWarning, match=rf"a\.dae: {message}$"):
         mesh = load_mesh(tmp_path / "a.dae")
     assert areas(mesh.vertices, mesh.faces)[:, 2].sum() / 2 == pytest.approx(expected)
+
+
+@pytest.mark.parametrize("polygons", [[L, DART], [WALL, SQUARE, [(0, 0), (1, 0), (0, 1)]]])
+def test_polygons_of_pyvista(polygons):
+    """Also those that VTK leaves out; the colors of cells follow."""
+    pyvista = pytest.importorskip("pyvista")
+    corners, faces = numbered(polygons)
+    points = [(x, y, 0) for x, y in corners]
+    data = pyvista.PolyData(points, np.concatenate([[len(face), *face] for face in faces]))
+    data.cell_data["c"] = np.arange(3 * len(faces), dtype=np.uint8).reshape(-1, 3) * 20
+    (mesh,) = from_pyvista(data).shapes
+    found = areas(mesh.vertices, mesh.faces)[:, 2] / 2
+    assert (found > 0).all()
+    shown = np.unique(mesh.colors[mesh.faces[:, 0], 0], return_inverse=True)[1]
+    assert np.bincount(shown, found) == pytest.approx([area(polygon) for polygon in polygons])

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from ..arrays.vec import Doubles
+from ..arrays.vec import Doubles, Ints
 from ..bsdfs import Diffuse
 from ..colors import srgb
 from ..colors.maps import ColorMap
@@ -21,6 +21,7 @@ from ..shapes.scalars import Coloring, check_count, lengths, map_material
 from ..shapes.smoothing import AUTO
 from ..textures.vertex_colors import VertexColors
 from .foreign import built, capsules, opaque, spheres
+from .polygons import triangulate
 from .repair import RawMesh, Table, with_face_colors
 
 NAME = "PyVista"
@@ -151,7 +152,36 @@ def _of_triangles(data: Any) -> Any:
     """Return PolyData whose faces are triangles."""
     flat = np.asarray(data.faces, np.intp).ravel()
     whole = not flat.size % 4 and not (flat[::4] != 3).any()
-    return data if whole and not getattr(data, "n_strips", 0) else data.triangulate()
+    if whole and not getattr(data, "n_strips", 0):
+        return data
+    found, starts = data.triangulate(), _starts(flat)
+    lost = flat.size - 3 * len(starts) - np.asarray(found.faces).size // 4
+    return _cut(data, flat, starts) if lost > 0 and not data.n_strips else found
+
+
+def _starts(flat: Ints) -> Ints:
+    """Return where the rows of polygons, a count and the indices, begin."""
+    width = int(flat[0]) + 1 if flat.size else 1
+    if not flat.size % width and (flat[::width] == width - 1).all():
+        return np.arange(0, flat.size, width)
+    starts, at = [], 0
+    while at < flat.size:
+        starts.append(at)
+        at += 1 + max(int(flat[at]), 0)
+    return np.array(starts, np.intp)
+
+
+def _cut(data: Any, flat: Ints, starts: Ints) -> Any:
+    """Return the same where VTK leaves out polygons, such as those that touch themselves."""
+    counts, corners = flat[starts], np.delete(flat, starts)
+    corner, polygon = triangulate(np.asarray(data.points, np.float64), corners, counts)
+    cut = type(data)(np.asarray(data.points), faces=np.insert(corners[corner], 0, 3, axis=1).ravel())
+    for name in list(data.point_data):
+        cut.point_data[name] = data.point_data[name]
+    for name in list(data.cell_data):
+        cut.cell_data[name] = np.asarray(data.cell_data[name])[-len(counts) :][polygon]
+    cut.set_active_scalars(data.active_scalars_name)
+    return cut
 
 
 def _corners(data: Any) -> Any:
