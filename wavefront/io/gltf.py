@@ -106,7 +106,8 @@ class _Meshes:
         total = len(self._of) + len(matrices) * len(parts)
         if total > limits.instances:
             most = f"{limits.instances} (LoadLimits.instances)"
-            raise LimitError(f"its nodes place {total} meshes so far; the limit is {most}")
+            place = f"{document.name}: nodes[{node.index}]"
+            raise LimitError(f"{place}: its nodes place {total} meshes so far; the limit is {most}")
         self._of += parts * len(matrices)
         self._names += _names_of_parts(node, len(parts)) * len(matrices)
         where = matrices.repeat(len(parts), 0)
