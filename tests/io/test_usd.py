@@ -190,8 +190,12 @@ def test_textures(tmp_path: Path) -> None:
             (PAINT % (text, IMAGE)).replace("asset inputs:file = @a.png@", "odd inputs:file = 3") + BOUND,
         )
     (tmp_path / "a.png").unlink()
-    with pytest.warns(UserWarning, match=r"/paint/image: texture 'a\.png' is missing; left out"):
-        load(tmp_path, PAINT % (text, IMAGE) + BOUND, strict=False)
+    for given, color in (("", [0.18] * 3), ("float4 inputs:fallback = (0.7, 0.1, 0.2, 1)", [0.7, 0.1, 0.2])):
+        image = IMAGE.replace("asset inputs:file", f"{given}\n        asset inputs:file")
+        with pytest.warns(UserWarning, match=r"/paint/image: texture 'a\.png' is missing; left out"):
+            scene = load(tmp_path, PAINT % (text, image) + BOUND, strict=False)
+        found = scene.shapes[0].material.bsdf
+        assert found.base_color.ravel() == pytest.approx(color)
 
 
 READERS = """def Shader "%s"

@@ -166,10 +166,10 @@ class _Surface:
         path = self._get(source, "file")
         if kind != "UsdUVTexture" or path is None:
             self.lose(source.GetPrim(), f"the shader {kind!r}" if kind != "UsdUVTexture" else "file")
-            return default
+            return self._fallback(source, output, default, color, normal, times)
         pixels = self.materials.pixels(source.GetPrim(), path)
         if pixels is None:
-            return default
+            return self._fallback(source, output, default, color, normal, times)
         scale, bias = self._get(source, "scale", (1, 1, 1, 1)), self._get(source, "bias", (0, 0, 0, 0))
         space = self._get(source, "sourceColorSpace", "auto")
         wraps = [str(self._get(source, name, "useMetadata")) for name in ("wrapS", "wrapT")]
@@ -188,6 +188,17 @@ class _Surface:
             offset=0.0 if normal else np.asarray(bias, float)[part] * times,
             uv_set=COORDINATES.index(field),  # type: ignore[arg-type]
         )
+
+    def _fallback(
+        self, source: Any, output: str, default: Any, color: bool, normal: bool, times: float
+    ) -> Any:
+        """Return what a texture has in place of an image that cannot be read."""
+        value = self._get(source, "fallback")
+        if value is None or normal:
+            return default
+        if color:
+            return tuple(float(part) * times for part in value[:3])
+        return float(value[CHANNELS.get(output, 0)]) * times
 
     def _get(self, source: Any, name: str, default: Any = None) -> Any:
         sources = _sources(source, name)
