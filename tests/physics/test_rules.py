@@ -15,6 +15,7 @@ import wavefront as wf
 from wavefront.accel import make_accelerator
 from wavefront.accel.brute_force import BruteForceTriangles
 from wavefront.accel.numpy_accel import SMALL
+from wavefront.arrays.vec import luminance
 from wavefront.compile.scale import MAX_DISTANCE
 from wavefront.compile.scene import CompiledScene, compile_scene
 from wavefront.lights import PatchedEnvironment, SkyPatches
@@ -478,12 +479,27 @@ def test_sensors_meet_what_cameras_do_not_see() -> None:
     assert radiance(sky, (0, -1, 0)) == pytest.approx(1, rel=1e-5)
 
 
-def test_roofs_that_cameras_do_not_see_hide_the_sun() -> None:
-    noon, patches = wf.Weather([1], [1], [(0, 1, 0)]), SkyPatches.of(1, np.eye(3)[:, [2, 0, 1]])
+def suns(roof: wf.Shape) -> list[float]:
+    """What gets of a sun at the zenith, of an irradiance of 1, below a roof and beside it."""
+    patches = SkyPatches.of(1, np.eye(3)[:, [2, 0, 1]])
     points, normals = np.array([(0.0, 0, 0), (5, 0, 0)]), np.array([(0.0, 1, 0)] * 2)
     nothing = np.zeros((8, 2, len(patches)))
-    for visible in (True, False):
-        roof = floor(wf.Material(BLACK, visible_to_camera=visible), half=1.0, y=1.0)
-        scene = wf.Scene([roof], PatchedEnvironment(np.ones((3, 1), f4), patches=patches))
-        found = wf.DaylightCoefficients(scene, points, normals, patches, nothing, nothing)
-        assert found.sunlight(noon)[:, 0].tolist() == [0, 1]
+    scene = wf.Scene([roof], PatchedEnvironment(np.ones((3, 1), f4), patches=patches))
+    found = wf.DaylightCoefficients(scene, points, normals, patches, nothing, nothing)
+    return found.sunlight(wf.Weather([1], [1], [(0, 1, 0)]))[:, 0].tolist()
+
+
+@pytest.mark.parametrize("visible", [True, False])
+def test_roofs_that_cameras_do_not_see_hide_the_sun(visible: bool) -> None:
+    roof = wf.Material(BLACK, visible_to_camera=visible)
+    assert suns(floor(roof, half=1.0, y=1.0)) == [0, 1]
+
+
+def test_the_sun_through_what_lets_a_part_of_it_through() -> None:
+    """A ray to the sun is not just blocked or not."""
+    assert suns(floor(wf.Material(BLACK, alpha=0.75), half=1.0, y=1.0)) == [0.25, 1]
+    assert suns(floor(wf.ShadowCatcher(), half=1.0, y=1.0)) == [0, 1]
+    smoke = wf.Medium(absorption=(0.5, 1, 2), scattering=(0.5, 0, 0))
+    for medium in (smoke, wf.GridMedium(np.ones((2, 2, 2)), [(-1, 1, -1), (1, 2, 1)], (1, 1, 2))):
+        box = wf.Box((0, 1.5, 0), (2, 1, 2), material=wf.Material(wf.NullSurface(), interior=medium))
+        np.testing.assert_allclose(suns(box), [luminance(np.exp((-1, -1, -2))), 1], rtol=1e-4)

@@ -9,15 +9,22 @@ from typing import Any, Unpack
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..arrays.vec import Doubles, f4, luminance
+from ..accel import most_copies
+from ..arrays.vec import Doubles, Floats, f4, luminance
 from ..camera import Sensors
+from ..compile.scene import CompiledScene, compile_scene
 from ..core.errors import SceneError, number
 from ..core.suggestions import suggests_keywords
 from ..io.to_scene import as_scene
 from ..lights import PatchedEnvironment, SkyPatches
+from ..sampling.sampler import Dimension
+from ..sampling.steps import StepNumbers
 from ..scene import Scene
 from ..scene.sun_position import horizon_axes
 from ..settings import AUTO, RenderSettings, takes_settings, whole_number
+from ..stages.inside import stacks_at
+from ..stages.intersect import ShadowRays
+from ..stages.transmittance import transmittance_along
 from .measure import measured
 from .weather import Weather, product
 from .year import Year
@@ -127,7 +134,8 @@ class DaylightCoefficients:
         """Return the light at the points in each hour of a weather file.
 
         The sky of an hour is that of `Sky.perez`. The direct light of the sun comes from where the sun is, by
-        a ray from each point; what surfaces and glass make of the sun's light is that of the patch around it.
+        a ray from each point, of which alpha and media take their part; what surfaces and glass make of the
+        sun's light is that of the patch around it.
 
         Parameters
         ----------
@@ -161,14 +169,38 @@ class DaylightCoefficients:
         lit = (cosine > 0) & (height > 0) & (weather.direct_normal > 0)
         at, hour = np.nonzero(lit)
         places = Sensors(self.points, self.normals).above(self._scene.bounds).places
+        scene = compile_scene(
+            self._scene, self._scene.accelerators.maker(AUTO), most_copies=most_copies(AUTO)
+        )
         for start in range(0, at.size, PAIRS):
             i, h = at[start : start + PAIRS], hour[start : start + PAIRS]
-            sensors = Sensors(places[i], weather.sun[h], "radiance")
-            seen = measured(
-                self._scene, sensors, 1, {"max_bounces": 0, "progress": False, "reuse": False}
-            ).value[:, 0]
-            out[i, h] = seen * cosine[i, h] * weather.direct_normal[h]
+            part = _part_let_through(scene, places[i], weather.sun[h], start)
+            out[i, h] = part * cosine[i, h] * weather.direct_normal[h]
         return out
+
+
+def _part_let_through(scene: CompiledScene, places: Doubles, toward: Doubles, first: int) -> Floats:
+    """Return the part (n,) of light from infinity that gets to places (n, 3), from unit vectors (n, 3).
+
+    Alpha and media take their part of it, the luminance of that of each channel. Grids of media draw numbers,
+    other ones for each `first`.
+    """
+    n, steps = len(places), None
+    origin = np.ascontiguousarray((places * scene.scale - scene.center).T, f4)
+    if scene.media is not None and scene.media.takes_steps:
+        number = np.arange(first, first + n).astype(np.uint32)
+        steps = StepNumbers.of(0, number, np.zeros_like(number), 0, Dimension.TRANSMITTANCE)
+    rays = ShadowRays(
+        origin=origin,
+        direction=np.ascontiguousarray(toward.T, f4),
+        exclude_prim=np.full(n, -1),
+        error=np.zeros(n, f4),
+        distance=np.full(n, np.inf, f4),
+        cos_light=np.ones(n, f4),
+        media=stacks_at(scene, origin),
+        steps=steps,
+    )
+    return luminance(transmittance_along(scene, rays))
 
 
 @takes_settings
