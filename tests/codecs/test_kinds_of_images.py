@@ -221,8 +221,12 @@ def test_the_first_bytes_say_what_a_file_is(tmp_path):
     ):
         (tmp_path / name).write_bytes(encoded(image, kind, **({"lossless": True} if kind == "WEBP" else {})))
         assert np.array_equal(wf.Texture(tmp_path / name)._texels.reshape(*SIZE, 3), RGBA[..., :3])
-    (tmp_path / "no_extension").write_bytes(encoded(image, "PNG"))
-    assert wf.Texture(tmp_path / "no_extension").size == SIZE[::-1]
+    for name in ("no_extension", "a.jfif"):
+        (tmp_path / name).write_bytes(encoded(image, "PNG"))
+        assert wf.Texture(tmp_path / name).size == wf.Image.load(tmp_path / name).shape[1::-1] == SIZE[::-1]
+    (tmp_path / "a.psd").write_bytes(b"8BPS" + bytes(100))
+    with pytest.raises(wf.SceneError, match=r"extension is '\.psd'; it must be one of"):
+        wf.Texture(tmp_path / "a.psd")
     (tmp_path / "a.tga").write_bytes(b"hello")
     with pytest.raises(wf.SceneError, match=r"a\.tga: not a readable tga image"):
         wf.Texture(tmp_path / "a.tga")

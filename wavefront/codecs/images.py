@@ -31,6 +31,7 @@ from .encoding import codes_to_linear
 from .image_data import TRANSPARENT, ImageData
 
 T = TypeVar("T")
+SIGNATURE_BYTES = 16
 COLOR_BYTES = 24  # of memory for each pixel of codes that become linear colors
 
 # called with a file and what it may take; returns uint8 or uint16 codes, or linear float32, (H, W, C)
@@ -212,11 +213,15 @@ def decode_codes(data: bytes, name: str, budget: Budget) -> NDArray[Any]:
 
 
 def _check_kind(path: str | os.PathLike[str]) -> None:
-    """Refuse a file of an unknown extension; of one without, the first bytes say what it is."""
-    if Path(path_name(path)).suffix:
-        _find(IMAGE_READERS, path)
-    else:
-        check_regular(path)
+    """Refuse a file of an unknown extension, unless its first bytes say what it is."""
+    name = path_name(path)
+    if Path(name).suffix.lower() not in IMAGE_READERS and os.path.exists(name):
+        check_regular(name)
+        with open(name, "rb") as file:
+            start = file.read(SIGNATURE_BYTES)
+        if any(start.startswith(starts) for starts, _ in SIGNED):
+            return
+    _find(IMAGE_READERS, path)
 
 
 def _decode(name: str, decode: Callable[[bytes, Budget], T], data: bytes, kind: str, budget: Budget) -> T:
