@@ -134,8 +134,8 @@ class DaylightCoefficients:
         """Return the light at the points in each hour of a weather file.
 
         The sky of an hour is that of `Sky.perez`. The direct light of the sun comes from where the sun is, by
-        a ray from each point, of which alpha and media take their part; what surfaces and glass make of the
-        sun's light is that of the patch around it.
+        a ray from each point, along which alpha and media take their part. What surfaces and glass make of
+        the sun's light is that of the patch around it.
 
         Parameters
         ----------
