@@ -1060,6 +1060,7 @@ TEXT = "solid a\nvertex 0 0 0\nvertex 1 0 0\nvertex 0 1 0\n{}\nendsolid\n"
         (stl(2**32 - 1, [FACET]), "the number of facets is 4294967295, but the file has 134 bytes; 1 read$"),
         (stl(2, [FACET, FACET])[:-1], "the number of facets is 2, but the file has 183 bytes; 1 read$"),
         (b"solid" + stl(2, [FACET, FACET])[5:-1], "the number of facets is 2, but the file has 183 bytes"),
+        (stl(0, [FACET]), "the number of facets is 0, but the file has 134 bytes; 1 read$"),
         (stl(1, [FACET]) + b"\r\n", "the number of facets is 1, but the file has 136 bytes; 1 read$"),
         (TEXT.format("vertex 0 0 0"), "line 5: facet is 1 vertex; left out$"),
         (TEXT.format("facet normal 0 0 1\nouter loop\nvertex 0 0 0\nvertex 0 1 0\nendloop"), "is 2 vertices"),

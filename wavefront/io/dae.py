@@ -6,11 +6,14 @@ Positions become meters by the `unit` of the file. The scene is told what is up 
 from __future__ import annotations
 
 import re
+import warnings
 import zipfile
 from io import BytesIO
+from typing import Any
 
 from ..core.errors import SceneError
 from .contents import Contents
+from .dae_mending import is_doubtful, mended
 from .dae_meshes import DaeMeshes
 from .placing import meters
 from .sources import SceneFiles
@@ -38,12 +41,7 @@ def parse(files: SceneFiles, data: bytes, materials: bool) -> Contents:
     check_expanded(name, document.children, document.sizes, "scene")
     for tag, line in document.lost.items() if materials else ():
         files.losses.note(tag, f"line {line}")
-    with typed_errors(name, "dae"):
-        import collada
-
-        read = collada.Collada(BytesIO(data), ignore=[collada.common.DaeError])
-        if read.scene is None:
-            raise SceneError(f"{name}: not a readable dae file: it has no scene")
+    read = _read(files, data)
     meshes = DaeMeshes(files, read, materials)
     contents = meshes.contents()
     # pycollada drops damaged parts without a warning
@@ -54,6 +52,36 @@ def parse(files: SceneFiles, data: bytes, materials: bool) -> Contents:
     contents.places.scale(meters(files.losses, "unit", read.assetInfo.unitmeter, 1.0))
     contents.up = document.up
     return contents
+
+
+def _read(files: SceneFiles, data: bytes) -> Any:
+    """Return what pycollada reads of a file, a second time with mended numbers if it cannot read all."""
+    read, error = None, None
+    if not is_doubtful(data):
+        try:
+            read = _collada(files.name, data)
+        except SceneError as found:
+            error = found
+    if read is None or read.errors:
+        with typed_errors(files.name, "dae"):
+            better = mended(data)
+        if better is not None:
+            files.losses.note("a number or index", value="damaged", done="what has it is left out")
+            return _collada(files.name, better)
+    if error is not None:
+        raise error
+    return _collada(files.name, data) if read is None else read
+
+
+def _collada(name: str, data: bytes) -> Any:
+    with typed_errors(name, "dae"), warnings.catch_warnings():
+        import collada
+
+        warnings.simplefilter("ignore", DeprecationWarning)  # of texts with other things than numbers
+        read = collada.Collada(BytesIO(data), ignore=[collada.common.DaeError])
+    if read.scene is None:
+        raise SceneError(f"{name}: not a readable dae file: it has no scene")
+    return read
 
 
 class _Document:

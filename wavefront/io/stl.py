@@ -36,7 +36,9 @@ def parse(losses: Losses, data: bytes) -> list[RawMesh]:
         return _text(losses, decode_text(data))
     if len(data) < START:
         raise SceneError(f"{losses.name}: has {plural(len(data), 'byte')}; a binary STL has at least {START}")
-    there = min((len(data) - START) // FACET.itemsize, count)
+    there, rest = divmod(len(data) - START, FACET.itemsize)
+    if count and rest:
+        there = min(there, count)
     if not exact:
         value = f"{count}, but the file has {plural(len(data), 'byte')}"
         losses.note("the number of facets", value=value, done=f"{there} read")

@@ -1,0 +1,86 @@
+"""Numbers of COLLADA files that pycollada would misread, or leave out a whole geometry for."""
+
+from __future__ import annotations
+
+import re
+from typing import Any
+from xml.etree import ElementTree
+
+import numpy as np
+
+from .text_lines import NUMBER
+
+NUMBERS = re.compile(rb"<(?:\w+:)?(?:p|h|vcount|float_array)\b[^>]*>([^<]*)<")
+MALFORMED = re.compile(rb"[^-+.eE\d\s]|[-+eE](?:\s|$)|\d[-+]|[-+.][-+]")  # pycollada reads up to these, or 0
+UNCHECKED = re.compile(rb"<(?:\w+:)?polygons\b")  # whose indices pycollada counts all together
+PRIMITIVES = ("triangles", "polylist", "polygons", "tristrips", "trifans")
+MOST = 2**31  # an index where nothing limits it
+NO_NUMBER, NO_INDEX = "1e39", -1  # what has one of these is left out
+
+
+def is_doubtful(data: bytes) -> bool:
+    """Return whether a text of numbers has something else, or pycollada does not check all indices."""
+    malformed = any(MALFORMED.search(found[1]) for found in NUMBERS.finditer(data))
+    return malformed or UNCHECKED.search(data) is not None
+
+
+def mended(data: bytes) -> bytes | None:
+    """Return a document that says so where a number is damaged, or an index too large; None without these."""
+    root = ElementTree.fromstring(data)
+    changed = [_mend_numbers(each) for each in root.iterfind(".//{*}float_array")]
+    for mesh in root.iterfind(".//{*}mesh"):
+        rows = _rows(mesh)
+        changed += [_mend_indices(part, rows) for part in mesh if _tag(part) in PRIMITIVES]
+    return ElementTree.tostring(root) if any(changed) else None
+
+
+def _tag(element: Any) -> str:
+    return str(element.tag).rpartition("}")[2]
+
+
+def _mend_numbers(element: Any) -> bool:
+    words = (element.text or "").split()
+    better = [word if NUMBER.fullmatch(word) and "n" not in word.lower() else NO_NUMBER for word in words]
+    element.text = " ".join(better)
+    return words != better
+
+
+def _rows(mesh: Any) -> dict[str, int]:
+    """Return how many rows each source of a mesh has, by its reference."""
+    rows = {}
+    for source in mesh.iterfind("{*}source"):
+        count = sum(len((each.text or "").split()) for each in source.iterfind("{*}float_array"))
+        strides = [each.get("stride", "1") for each in source.iterfind(".//{*}accessor")]
+        stride = int(strides[0]) if strides and strides[0].isdecimal() else 1
+        rows[f"#{source.get('id')}"] = count // max(stride, 1)
+    for vertices in mesh.iterfind("{*}vertices"):
+        used = [rows.get(each.get("source", ""), 0) for each in vertices.iterfind("{*}input")]
+        rows[f"#{vertices.get('id')}"] = min(used, default=0)
+    return rows
+
+
+def _mend_indices(primitive: Any, rows: dict[str, int]) -> bool:
+    """Mend the indices of a primitive, which come in groups: one for each offset of its inputs."""
+    most: dict[int, int] = {}
+    for each in primitive.iterfind("{*}input"):
+        offset = each.get("offset", "0")
+        if offset.isdecimal() and len(offset) < 3:
+            number = int(offset)
+            most[number] = min(most.get(number, MOST), rows.get(each.get("source", ""), MOST))
+    width = max(most, default=0) + 1
+    limits = np.array([most.get(offset, MOST) for offset in range(width)])
+    whole = width * (3 if _tag(primitive) == "triangles" else 1)
+    changed = False
+    for element in primitive.iter():
+        if _tag(element) in ("p", "h", "vcount"):
+            words = (element.text or "").split()
+            found = np.array(
+                [int(word) if re.fullmatch(r"\d{1,9}", word) else NO_INDEX for word in words], int
+            )
+            if _tag(element) != "vcount":
+                found = found[: len(found) // whole * whole].reshape(-1, width)
+                found = np.where(found < limits, found, NO_INDEX).ravel()
+            better = [str(index) for index in found.tolist()]
+            changed |= better != words
+            element.text = " ".join(better)
+    return changed
