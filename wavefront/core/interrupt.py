@@ -6,6 +6,8 @@ here does anything.
 
 from __future__ import annotations
 
+import multiprocessing
+import os
 import signal
 import threading
 from collections.abc import Callable, Iterator, Mapping
@@ -15,8 +17,29 @@ from typing import Any, Self
 
 from .shared import AT_ONCE, STOP, SharedInt
 
+ORPHAN_TIMEOUT = 1.0  # seconds that a process has to end after its parent
 NAMES = "SIGTERM", "SIGHUP", "SIGINT"  # Windows has no SIGHUP, which says that the terminal was closed
 SIGNALS = [signal.Signals[name] for name in NAMES if name in signal.Signals.__members__]
+
+
+def end_with_parent() -> None:
+    """Do what Ctrl-C does in a process of multiprocessing whose parent has ended: nobody takes its results.
+
+    The sentinel tells that, which a process has only if multiprocessing started it. The id of the parent also
+    changes where a terminal is closed and a script goes on. A process that catches the exception, as those of
+    `concurrent.futures` do, ends a moment later: the others that it was forked with wait for that.
+
+    Raises
+    ------
+    KeyboardInterrupt
+        If the parent has ended.
+    """
+    parent = multiprocessing.parent_process()
+    if parent is not None and not parent.is_alive():
+        timer = threading.Timer(ORPHAN_TIMEOUT, os._exit, (1,))
+        timer.daemon = True
+        timer.start()
+        raise KeyboardInterrupt("the process that started this one has ended")
 
 
 class InterruptHandler:

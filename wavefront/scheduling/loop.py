@@ -8,6 +8,7 @@ from itertools import chain
 from typing import TypeAlias
 
 from ..core.errors import RenderError
+from ..core.interrupt import end_with_parent
 from ..core.progress import Bar, Progress
 from ..core.shared import SharedInt, Stopped
 from .accumulator import Accumulator
@@ -96,6 +97,7 @@ class RenderLoop:
         with Bar(self._progress, most, self._seconds) as bar:
 
             def waiting() -> None:
+                end_with_parent()
                 bar.wait(surfaces.value, self.scheduler.elapsed)
                 wave_done()
 

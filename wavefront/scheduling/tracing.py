@@ -17,6 +17,7 @@ from ..arrays.state import Words
 from ..arrays.vec import Floats, Ints, broadcast
 from ..compile.scene import CompiledScene
 from ..core.errors import SceneError
+from ..core.interrupt import end_with_parent
 from ..core.shared import SharedInt, Stopped
 from ..guiding import GuideTable
 from ..integrators import Integrator, integrator_for
@@ -51,7 +52,10 @@ class WaveMonitor:
         ------
         Stopped
             If the stop flag is set, or the wave's deadline is over.
+        KeyboardInterrupt
+            If this is a process of multiprocessing, and its parent has ended.
         """
+        end_with_parent()
         self.surfaces.rise_to(surfaces)
         if self.stop.value or time.perf_counter() > deadline:
             raise Stopped
