@@ -619,9 +619,23 @@ def test_nothing_but_the_page_is_served(viewer: wf.Viewer) -> None:
     assert status(viewer.url) == status(f"{base}first.jpg?{query}") == 200
     for path in ("../page.py", "%2e%2e/%2e%2e/_viser.py", "/etc/passwd", "..%5c..%5c_viser.py", "index.php"):
         assert status(f"{base}{path}?{query}") == 404
+    for path in ("a" * 5000, "a" * 300, "b/" * 2000, "%00", "a%00b.js"):
+        assert status(f"{base}{path}?{query}") == 404
     for path in ("", "first.jpg", "index.html", "?token=wrong", "../page.py"):
         assert status(base + path) == 403
     assert status(viewer.url, Host="evil.example") == status(viewer.url, Origin="http://evil.example") == 403
+
+
+def test_memory_of_connections_is_given_back(viewer: wf.Viewer, calls_of: Any) -> None:
+    """When the last page is left: the C library would keep it."""
+    trimmed: list[None] = []
+    calls_of("wavefront.viewer.page.trim_heap", lambda: trimmed.append(None))
+    pages = [Client(viewer) for _ in range(3)]
+    for page in pages[:2]:
+        page.socket.close()
+    assert not trimmed
+    pages[2].socket.close()
+    assert eventually(lambda: trimmed == [None])
 
 
 def test_a_token_may_be_given_or_left_out() -> None:

@@ -1,4 +1,4 @@
-"""The memory of worker processes."""
+"""The heap of processes: what workers keep of it, and what is given back to the system."""
 
 from __future__ import annotations
 
@@ -28,3 +28,9 @@ def prepare_heap() -> None:
     with suppress(MemoryError):
         grown = [np.empty(9 * LARGEST_BLOCK // 10, np.uint8) for _ in range(BLOCKS)]
         del grown
+
+
+def trim_heap() -> None:
+    """Have glibc give back to the system what is free; with another C library, do nothing."""
+    with suppress(AttributeError, OSError, TypeError):
+        ctypes.CDLL(None).malloc_trim(0)

@@ -168,7 +168,10 @@ def asked_first(first_paint: FirstPaint) -> Iterator[None]:
 
         async def answer(connection: Any, request: Any) -> Any:
             assert process_request is not None
-            return await first_paint.answer(request) or process_request(connection, request)
+            try:
+                return await first_paint.answer(request) or process_request(connection, request)
+            except (OSError, ValueError):  # a path that the file system does not take, such as a long one
+                return _refused(HTTPStatus.NOT_FOUND, "there is no such file")
 
         ours: dict[str, Any] = {
             "process_request": answer,

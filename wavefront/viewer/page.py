@@ -19,6 +19,7 @@ from ..codecs.tone import TONES
 from ..core.errors import SceneError, one_of
 from ..denoising import FEW, is_quick
 from ..image import Image
+from ..scheduling.heap import trim_heap
 from .background_denoiser import BackgroundDenoiser
 from .first_paint import FirstPaint, asked_first
 from .guard import Guard, take_values
@@ -216,6 +217,7 @@ class Page:
             with self._lock:
                 self._sized = False
             self._server.scene.set_background_image(None)
+            trim_heap()  # of what connections took
 
     def _resize(self, camera: Any) -> None:
         self._change(self.viewpoint.resized(camera.image_width, camera.image_height))
