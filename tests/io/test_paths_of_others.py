@@ -279,6 +279,17 @@ def test_what_is_found_is_inside_the_folders(scene):
             files.stored(files.find(name))
 
 
+def test_what_libraries_open_by_its_name_is_found_by_its_very_name(scene):
+    (scene / "f.usda").write_text("")
+    files = SceneFiles(scene / "a.usda")
+    assert files.named("./f.usda").name == "f.usda"
+    assert not files.named("sub/f.usda").exists()
+    for name in ("../f.usda", "C:\\f.usda", "/home/f.usda"):
+        assert files.find(name) == scene / "f.usda"
+        with pytest.raises(SceneError, match=r"refers to"):
+            files.named(name)
+
+
 def test_no_file_outside_is_opened(scene):
     """Whatever names a scene has: each path that Python opens meanwhile is inside of the folder."""
     outside = scene.parent / "images"

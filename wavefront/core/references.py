@@ -94,7 +94,7 @@ def elsewhere(
         for name in _names(reference):
             for place in places:
                 there = name if exact else _in_any_case(place, name, roots, listed)
-                if there is not None and os.path.exists(place / there):
+                if there is not None and os.path.isfile(place / there):
                     with suppress(SceneError):
                         return followed(source, there, [place], roots)[0]
     return None

@@ -166,25 +166,52 @@ class SceneFiles:
             If there is none and the name is a URI, absolute, or leads out of all folders; or if the file is
             too large or not a regular one.
         """
-        source = self.scene if base is None else base
-        roots = [_folder(self.scene), *(each.resolve() for each in self.search_paths)]
-        places = [
-            *([_folder(source)] if folders is None else (each.resolve() for each in folders)),
-            *roots[1:],
-        ]
+        refused: SceneError | None = None
         try:
-            allowed, refused = followed(source, reference, places, roots), None
+            named = self.named(reference, base, folders)
+            if os.path.exists(named):
+                return named
         except SceneError as error:
-            allowed, refused = [], error
-        found = next((path for path in allowed if os.path.exists(path)), None)
-        if found is None and (found := elsewhere(source, reference, places, roots, self._listed)) is not None:
-            self._note_found(reference, source, found)
+            if passed_limit(error):
+                raise
+            refused = error
+        source, places, roots = self._places(base, folders)
+        found = elsewhere(source, reference, places, roots, self._listed)
         if found is not None:
+            self._note_found(reference, source, found)
             check_regular(found, self.limits.file_bytes)
             return found
         if refused is not None:
             raise refused
-        return allowed[0]
+        return named
+
+    def named(
+        self, reference: str, base: PathLike | None = None, folders: Sequence[Path] | None = None
+    ) -> Path:
+        """Return the path of a file by its very name: what a library opens by this name must be found so.
+
+        It is that of the first place where the file exists, or else the first allowed one.
+
+        Raises
+        ------
+        SceneError
+            If the name is a URI, absolute, or leads out of all folders, or the file is too large or not a
+            regular one.
+        """
+        allowed = followed(self.scene if base is None else base, reference, *self._places(base, folders)[1:])
+        found = next((path for path in allowed if os.path.exists(path)), None)
+        if found is not None:
+            check_regular(found, self.limits.file_bytes)
+        return found or allowed[0]
+
+    def _places(
+        self, base: PathLike | None, folders: Sequence[Path] | None
+    ) -> tuple[PathLike, list[Path], list[Path]]:
+        """Return the file that refers to another one, where that is looked for, and where it must be."""
+        source = self.scene if base is None else base
+        roots = [_folder(self.scene), *(each.resolve() for each in self.search_paths)]
+        first = [_folder(source)] if folders is None else [each.resolve() for each in folders]
+        return source, [*first, *roots[1:]], roots
 
     def _note_found(self, reference: str, source: PathLike, found: Path) -> None:
         """Note that a file was found under another name, unless the name is only written as in a URI."""

@@ -113,10 +113,10 @@ class Layers:
         outer = os.path.relpath(outer, os.path.dirname(own)) if os.path.isabs(outer) else outer
         if "#" in os.path.basename(outer):  # clips by their numbers
             for each in _numbered(own, outer):
-                self._await(str(self._files.find(each, own)))
+                self._await(str(self._files.named(each, own)))
             return path
-        found = self._files.find(outer, own)
-        if not found.exists():
+        found = self._files.named(outer, own)
+        if not os.path.exists(found):
             raise SceneError(f"{own}: refers to {path!r}, which is missing")
         self._count(found)
         target = f"{found}[{inner}]" if inner else str(found)

@@ -101,7 +101,7 @@ class Materials:
         """Return the content of an image in an archive, which may be read."""
         from pxr import Ar
 
-        self.files.find(self._inside(name.partition("[")[0]))
+        self.files.named(self._inside(name.partition("[")[0]))
         asset = Ar.GetResolver().OpenAsset(Ar.ResolvedPath(name))
         if not asset:
             raise SceneError(MISSING)
