@@ -23,7 +23,7 @@ ROOT = Path(__file__).parents[2]
 DOCUMENT = (ROOT / "docs" / "command_line.md").read_text("utf-8")
 TETRAHEDRON = "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 3 2\nf 1 2 4\nf 2 3 4\nf 1 4 3\n"
 FAST = ["--spp", "1", "--size", "16x12", "--lighting", "even", "--quiet"]
-FOR_DEVELOPERS = {"test", "dev", "docs", "bench"}
+FOR_DEVELOPERS = {"all", "test", "dev", "docs", "bench"}
 
 
 def program(*arguments: object, cwd: Path | None = None) -> subprocess.CompletedProcess[str]:

@@ -21,6 +21,9 @@ from wavefront.datasets.annotated import annotated_objects
 from wavefront.datasets.masks import mask_box, run_lengths
 from wavefront.datasets.models import diameter, write_models
 
+# the ball and the plate of `scene`
+pytestmark = pytest.mark.filterwarnings("ignore:objects without a (model|pose)")
+
 SIZE = (60, 40)
 MM = 250  # millimeters of a scene unit
 BOX = trimesh.creation.box((1, 1, 1))
@@ -463,3 +466,12 @@ def test_setting_up_takes_under_a_twentieth_of_the_time(
     print(f"set-up {spent:.2f} s of {whole:.1f} s: {spent / whole:.1%}")
     assert spent < 0.05 * whole
     assert len(COCO(tmp_path / "annotations.json").imgs) == 200
+
+
+def test_objects_without_a_model_or_a_pose_are_told(tmp_path) -> None:
+    with pytest.warns(UserWarning, match="objects without a") as caught:
+        write_models(tmp_path, scene().shapes, annotated_objects(scene().shapes, None), MM)
+    assert [str(each.message).partition(":")[2].partition(";")[0] for each in caught] == [
+        " 'ball' (Sphere)",
+        " 'plate'",
+    ]

@@ -209,10 +209,10 @@ def test_points_that_are_not_finite_are_dropped(tmp_path: Path) -> None:
 
 
 def test_points_choose_a_radius() -> None:
-    """So that those of a grid touch; a single one, and many in one place, have some."""
+    """So that those of a grid touch; many in one place have some."""
     with pytest.warns(UserWarning, match="points: 120 points are shown as spheres of radius 0.5"):
         assert wf.Points(GRID).radii == pytest.approx(0.5)
-    for places in ([(0, 0, 0)], np.zeros((9, 3)), [(0, 0, 0), (1, 0, 0)]):
+    for places in (np.zeros((9, 3)), [(0, 0, 0), (1, 0, 0)]):
         with pytest.warns(UserWarning, match="radius"):
             assert wf.Points(places).radii > 0
 
@@ -277,7 +277,7 @@ def test_meshes_of_pyvista() -> None:
 
 def test_points_and_lines_of_pyvista() -> None:
     none = np.zeros(0, int)
-    with pytest.warns(UserWarning, match="PyVista: has no faces; 4 points become spheres of radius 0.707"):
+    with pytest.warns(UserWarning, match="PyVista: has no faces; 4 points become spheres of radius 0.5 "):
         (cloud,) = wf.from_pyvista(poly(faces=none, point_data={"RGB": CODES})).shapes
     assert cloud.colors[0] == pytest.approx([0.2158605, 1, 0, 1])  # type: ignore[attr-defined]
     with pytest.warns(UserWarning, match=r"3 lines become capsules of radius 0.00354"):
@@ -324,3 +324,24 @@ def test_meshes_points_and_lines_of_open3d() -> None:
     ):
         with pytest.raises(wf.SceneError, match=message):
             wf.from_open3d(bad)
+
+
+@pytest.mark.parametrize("count", [2, 3, 4, 8])
+def test_few_points_have_a_radius_by_their_nearest_neighbor(count: int) -> None:
+    """However far the others are."""
+    places = np.zeros((count, 3))
+    places[:, 0] = 10.0 ** np.arange(count)
+    gaps = np.abs(places[:, None, 0] - places[None, :, 0]) + np.diag([np.inf] * count)
+    with pytest.warns(UserWarning, match="are shown as spheres of radius"):
+        cloud = wf.Points(places)
+    assert cloud.radii[0] == pytest.approx(np.sqrt(np.median(gaps.min(1) ** 2)) / 2)
+
+
+def test_one_point_needs_a_radius(tmp_path: Path) -> None:
+    """Given as an array, or in a file."""
+    with pytest.raises(wf.SceneError, match="a radius for one point is not known"):
+        wf.Points([(0, 0, 0)])
+    assert wf.Points([(0, 0, 0)], 0.1).radii.tolist() == [0.1]
+    (tmp_path / "a.obj").write_text("v 1 2 3\n")
+    with pytest.raises(wf.SceneError, match="a radius for one point is not known"):
+        wf.load(tmp_path / "a.obj")

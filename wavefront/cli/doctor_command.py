@@ -79,6 +79,7 @@ EXTRAS = {
     "nrrd": Extra(("pynrrd",), "load_grid: grids of NRRD for media"),
     "vti": Extra(("vtk",), "load_grid: grids of VTK, ImageData, for media"),
     "pyvista": Extra(("pyvista",), "data.wavefront.render(...) and plotter.wavefront.render(...)"),
+    "gltf": Extra(("dracopy", "meshopt"), "compressed meshes of glTF"),
     "completion": Extra(("shtab",), "completion of this command line in bash and zsh"),
 }
 

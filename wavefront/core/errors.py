@@ -145,7 +145,8 @@ class Interrupted(_WithImage, KeyboardInterrupt):
                 from IPython.display import display  # IPython is installed: it called this method
 
                 display(self.image)
-        return [f"{type(self).__name__}: {self}"]
+        where = [] if self.image is None else ["the picture so far: import sys; sys.last_value.image"]
+        return [f"{type(self).__name__}: {self}", *where]
 
 
 def warn_caller(message: str) -> None:

@@ -11,11 +11,13 @@ from numpy.typing import NDArray
 
 from ..arrays.vec import Doubles, f4
 from ..colors import linear_to_srgb
+from ..core.errors import warn_caller
 from ..core.files import make_folder, write_bytes, write_json
 from ..shapes import Instance, Mesh, Shape
 from .annotated import AnnotatedObject
 
 FOLDER = "models"
+MOST_LISTED = 200  # letters of names in a warning
 BLOCK = 64  # points that are compared with others at once, or a thousandth of all
 AXES = "xyz"
 
@@ -38,6 +40,7 @@ def write_models(
     millimeters
         Of a scene unit.
     """
+    _warn_of_objects(shapes, objects)
     meshes = {item.model: _model(shapes[number], item) for number, item in objects.items()}
     make_folder(folder / FOLDER)
     sizes = {}
@@ -47,6 +50,30 @@ def write_models(
             write_bytes(folder / FOLDER / f"obj_{number:06d}.ply", _ply(mesh, millimeters))
             sizes[str(number)] = _size(points)
     write_json(folder / FOLDER / "models_info.json", sizes)
+
+
+def _warn_of_objects(shapes: Sequence[Shape], objects: Mapping[int, AnnotatedObject]) -> None:
+    """Warn of objects that are no meshes, and so have no model, and of instances without a pose."""
+    kinds = {item.name: type(shapes[number]).__name__ for number, item in objects.items()}
+    bare = [name for number, name in _names(objects) if not isinstance(shapes[number], Instance | Mesh)]
+    still = [
+        name
+        for number, name in _names(objects)
+        if isinstance(shapes[number], Instance) and not objects[number].of_mesh
+    ]
+    if bare:
+        listed = ", ".join(f"{name!r} ({kinds[name]})" for name in dict.fromkeys(bare))
+        warn_caller(f"objects without a model, as they are no meshes: {listed[:MOST_LISTED]}")
+    if still:
+        listed = ", ".join(map(repr, dict.fromkeys(still)))
+        warn_caller(
+            f"objects without a pose, as they are scaled or mirrored: {listed[:MOST_LISTED]}; their models "
+            "are in world coordinates"
+        )
+
+
+def _names(objects: Mapping[int, AnnotatedObject]) -> list[tuple[int, str]]:
+    return [(number, item.name) for number, item in objects.items()]
 
 
 def _model(shape: Shape, item: AnnotatedObject) -> Mesh | None:

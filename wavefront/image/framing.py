@@ -35,16 +35,15 @@ def cropped(image: Image, window: Any) -> Image:
     if "window" in metadata:
         x, y = metadata["window"][:2]
         metadata["window"] = [x + sides[0], y + sides[1], x + sides[2], y + sides[3]]
-    return type(image)(
-        of(image.rgb),
-        image.spp,
-        metadata,
-        counts=of(image.counts),
-        variance=of(image.variance),
-        standard_error=of(image.standard_error),
-        layers={name: of(values) for name, values in image.layers.items()},
-        errors={name: of(values) for name, values in image.errors.items()},
-        names=image.names,
+    return image.with_parts(
+        rgb=of(image.rgb),
+        metadata=metadata,
+        **{name: of(getattr(image, name)) for name in ("counts", "variance", "standard_error", "halves")},
+        **{
+            name: {each: of(values) for each, values in getattr(image, name).items()}
+            for name in ("layers", "errors", "measured")
+        },
+        sums=None,
         scatter=[Scatter(of(each.deviations), of(each.tile)) for each in image.scatter],
     )
 

@@ -439,7 +439,7 @@ class Image(Answers):
         def scaled(arrays: Mapping[str, NDArray[Any]], by: NDArray[np.float32]) -> dict[str, NDArray[Any]]:
             return {name: array * by if is_radiance(name) else array for name, array in arrays.items()}
 
-        return self._with(
+        return self.with_parts(
             rgb=self.rgb * scale,
             variance=None if self.variance is None else self.variance * size**2,
             standard_error=None if self.standard_error is None else self.standard_error * size,
@@ -521,7 +521,7 @@ class Image(Answers):
         picture = noisy_picture(source.rgb, source.standard_error, source.layers, source.errors, source.spp)
         rgb, used = denoise(picture, denoiser)
         error = {} if source.standard_error is None else {NOISY: source.standard_error}
-        return source._with(
+        return source.with_parts(
             rgb=rgb,
             metadata={**source.metadata, "denoiser": used},
             standard_error=None,
@@ -534,7 +534,7 @@ class Image(Answers):
         """The picture before denoising; None if this one was not denoised."""
         if NOISY not in self.layers:
             return None
-        return self._with(
+        return self.with_parts(
             rgb=self.layers[NOISY],
             metadata={name: value for name, value in self.metadata.items() if name != "denoiser"},
             standard_error=self.errors.get(NOISY),
@@ -542,7 +542,7 @@ class Image(Answers):
             errors={name: error for name, error in self.errors.items() if name != NOISY},
         )
 
-    def _with(self, **parts: Any) -> Image:
+    def with_parts(self, **parts: Any) -> Image:
         """Return the picture with other parts."""
         return Image(**{name: vars(self)[name] for name in PARTS} | parts)
 
@@ -677,7 +677,7 @@ class Image(Answers):
         layers = dict(self.layers)
         if "alpha" in layers:
             layers["alpha"] = layers["alpha"] * (1 - covered) + covered
-        return self._with(
+        return self.with_parts(
             rgb=np.asarray(self.rgb * left + ink * covered[..., None], np.float32),
             variance=None if self.variance is None else self.variance * left**2,
             standard_error=None if self.standard_error is None else self.standard_error * left,

@@ -17,7 +17,8 @@ from .mesh import Mesh, positions
 from .segments import Capsules
 from .spheres import Spheres
 
-NEIGHBOR = 4  # a point of a square grid has as many neighbors at the same distance
+FEW = 8  # points, whose radius follows from the nearest neighbor
+NEIGHBOR = 4  # of more: a point of a square grid has as many neighbors at the same distance
 MOST_DISTANCES, LEAST_POINTS = 1 << 22, 64  # that are looked at to choose a radius
 
 
@@ -41,7 +42,8 @@ def Points(
         colors are taken if it has any.
     radius
         One number, or (n,), scene units. By default half of the median distance of a point to its fourth
-        nearest neighbor, so that spheres on a grid touch; a warning states it.
+        nearest neighbor, so that spheres on a grid touch, and of eight points or fewer to its nearest; a
+        warning states it.
     colors
         (n, 3) or (n, 4), as of `Spheres`.
     material, name, cmap, clim
@@ -50,7 +52,7 @@ def Points(
     Raises
     ------
     SceneError
-        If an argument is malformed or out of range.
+        If an argument is malformed or out of range, or a single point has no radius.
 
     Examples
     --------
@@ -129,8 +131,10 @@ def point_colors(data: Any) -> Any:
 def usual_radius(points: Doubles) -> float:
     """Return a radius for spheres at points (n, 3) so that they nearly touch: see `Points`."""
     count = len(points)
+    if count < 2:
+        raise SceneError("a radius for one point is not known, as it has no neighbor: give it a radius")
     some = points[:: max(1, count // max(LEAST_POINTS, MOST_DISTANCES // count))]
-    rank = min(NEIGHBOR, count - 1)
+    rank = NEIGHBOR if count > FEW else 1
     found = np.zeros(len(some))
     for number, point in enumerate(some):
         away = points - point

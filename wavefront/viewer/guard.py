@@ -16,13 +16,19 @@ TOKEN_BYTES = 24  # of a token that is drawn: nobody can guess it
 LARGEST_MESSAGE = 1 << 16  # bytes; cameras and values are much smaller
 
 
+@cache  # so that a page that is open finds the next viewer at its address
+def _drawn() -> str:
+    """Return a token that is drawn once."""
+    return secrets.token_hex(TOKEN_BYTES)
+
+
 def token_of(token: str | bool) -> str:
     """Return the token that the address of a page has, "" for none.
 
     Parameters
     ----------
     token
-        True draws one, False leaves it out; a text is taken.
+        True draws one, the same as long as the program runs; False leaves it out; a text is taken.
 
     Raises
     ------
@@ -30,7 +36,7 @@ def token_of(token: str | bool) -> str:
         If it is something else, or an empty text.
     """
     if isinstance(token, bool):
-        return secrets.token_hex(TOKEN_BYTES) if token else ""
+        return _drawn() if token else ""
     if not isinstance(token, str) or not token:
         raise SceneError(f"token is {token!r}; it must be a text that is not empty, True or False")
     return token

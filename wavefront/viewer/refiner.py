@@ -59,6 +59,7 @@ class Refiner:
         self._changes = 0  # of the view, so far
         self._refines = False  # in full resolution; a change stops that
         self._closed = False
+        self._next: Session | None = None  # in place of the one that is rendered
         self._looked_at = threading.Event()
         self._divisor = FIRST_DIVISOR
         self._thread = threading.Thread(target=self._loop, name="wavefront-viewer", daemon=True)
@@ -79,6 +80,14 @@ class Refiner:
             self._wanted = camera
             self._changed()
 
+    def replace(self, session: Session, camera: Camera) -> None:
+        """Render another session from now on, in place of the one before, which is closed."""
+        with self._lock:
+            if self._next is not None:
+                self._next.close()
+            self._next, self._wanted = session, camera
+            self._changed()
+
     def close(self) -> None:
         """End the thread and the session."""
         with self._lock:
@@ -88,6 +97,8 @@ class Refiner:
         if self._thread.is_alive():
             self._thread.join()
         self._session.close()
+        if self._next is not None:
+            self._next.close()
 
     def _changed(self) -> None:
         """Wake the loop, or stop the picture that refines; the lock is held."""
@@ -106,10 +117,22 @@ class Refiner:
                     return
                 assert self._wanted is not None
                 camera, done = self._wanted, self._changes
+                other, self._next = self._next, None
             try:
+                if other is not None:
+                    self._take(other)
                 self._render(camera, done)
             except Exception as error:  # what a user's own material raises, too: the loop goes on
                 self._fail(error)
+
+    def _take(self, session: Session) -> None:
+        """Go on with another session."""
+        before = self._session
+        with self._lock:
+            self._session = session
+        before.close()
+        session.__enter__()
+        session.start_workers()
 
     def _render(self, camera: Camera, change: int) -> None:
         """Show pictures of a view until it is done or another one is wanted."""

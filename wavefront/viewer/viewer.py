@@ -6,6 +6,8 @@ import atexit
 import sys
 import threading
 import webbrowser
+from collections.abc import Callable
+from copy import copy
 from importlib.util import find_spec
 from typing import Any, Self, Unpack
 
@@ -16,6 +18,7 @@ from ..core.suggestions import suggests_keywords
 from ..image import Image
 from ..io.to_scene import COLORING, as_scene, choose_camera, coloring_of
 from ..scene import Scene
+from ..scene.state import scene_state
 from ..scheduling.executors import choose_executor, needs_pickling, worker_count
 from ..session import Session
 from ..session.notebook import in_kernel
@@ -29,6 +32,7 @@ from .viewpoint import Viewpoint
 # Paths: a movement waits for less of a smaller wave, and one of half the size costs 10 % more.
 WAVE_SIZE = 1 << 15
 POLL = 0.5  # seconds
+WATCH = 0.5  # seconds between looks at whether the scene has changed
 FRAME = "100%", 600  # width and height of the page in a notebook
 REFUSED = dict.fromkeys(("checkpoint", "samples", "progress"), "it is for a picture of one view")
 
@@ -77,7 +81,10 @@ class Viewer:
         token: str,
         tone: str,
         spp: int | None,
+        renew: Callable[[], Session] | None = None,
+        state: Callable[[], object] | None = None,
     ) -> None:
+        self._renew, self._state = renew, state
         self._wanted: Camera | None = None
         self._latest: ViewerFrame | None = None
         self._error: Exception | None = None  # that ended the newest view
@@ -96,6 +103,9 @@ class Viewer:
             raise
         self.url, self.elsewhere = self._page.url, self._page.elsewhere
         atexit.register(self.close)
+        if state is not None:
+            self._shown_state = state()
+            threading.Thread(target=self._watch, name="wavefront-viewer-watch", daemon=True).start()
         if self._latest is not None:
             self._page.show(self._latest)
 
@@ -144,6 +154,51 @@ class Viewer:
             raise RenderError(f"the view was not rendered: {self._error}", self.image) from self._error
         why = "was closed" if self._closed.is_set() else f"has no last picture after {timeout} s"
         raise RenderError(f"the viewer {why}", self.image)
+
+    def update(self) -> None:
+        """Show the scene as it is now, after its shapes, materials or lights were changed.
+
+        It is done by itself within a second or two where objects of the scene were changed or replaced. Of
+        arrays that were changed in place, such as `mesh.vertices[0] = ...`, only this call knows.
+
+        Raises
+        ------
+        SceneError
+            If the scene cannot be rendered as it is; the page shows the old one.
+        RenderError
+            If the viewer is closed.
+
+        Examples
+        --------
+        >>> import wavefront as wf
+        >>> ball = wf.Sphere((0, 0, 0), 1)
+        >>> with wf.view(ball, spp=4, size=(32, 32), open_browser=False, block=False) as viewer:
+        ...     ball.material = "gold"
+        ...     viewer.update()
+        ...     image = viewer.wait_for_picture()
+        """
+        if self._closed.is_set() or self._renew is None:
+            raise RenderError("the viewer is closed")
+        if self._state is not None:
+            self._shown_state = self._state()
+        session = self._renew()
+        with self._news:
+            self._wanted, self._error = copy(self.camera), None  # a view of its own, to be waited for
+        self._refiner.replace(session, self._wanted)
+
+    def _watch(self) -> None:
+        """Update the picture when the scene has changed, and has not since."""
+        assert self._state is not None
+        before = self._shown_state
+        while not self._closed.wait(WATCH):
+            found = self._state()
+            if found == before and found != self._shown_state:
+                try:
+                    self.update()
+                except Exception as error:  # as of a scene that is not complete yet
+                    self._shown_state = found
+                    self._fail(error)
+            before = found
 
     def wait(self) -> None:
         """Wait until the viewer is closed, or for Ctrl-C, which closes it."""
@@ -222,7 +277,8 @@ def view(
     port
         Where to listen; if it is taken, one of the next.
     token
-        What the address of the page has as `?token=`; requests without it are refused. True draws a new one,
+        What the address of the page has as `?token=`; requests without it are refused. True draws one, which
+        later viewers of the program have, too, so that an open page finds them at the same port;
         a text is taken as it is, and False lets in all who can connect.
     tone
         The tone curve that the page begins with, as for `Image.save`; the page can change it.
@@ -293,9 +349,13 @@ def _opened(
         settings["wave_size"] = WAVE_SIZE
     if settings.get("executor") is None:
         settings["executor"] = _executor(settings.get("workers"), (spp or DEFAULT_SPP) * viewpoint.pixels)
-    with giving_way():
-        session = Session(scene, spp, **settings)
-    return Viewer(session, viewpoint, host, port, token, tone, spp)
+
+    def renew() -> Session:
+        scene.check()
+        with giving_way():
+            return Session(scene, spp, **settings)
+
+    return Viewer(renew(), viewpoint, host, port, token, tone, spp, renew, lambda: scene_state(scene))
 
 
 def _executor(workers: int | None, paths: int) -> str | None:
