@@ -70,7 +70,8 @@ stride="3"><param name="X" type="float"/><param name="Y" type="float"/><param na
 </accessor>
 </technique_common></source><vertices id="v"><input semantic="POSITION" source="#p"/></vertices>
 <triangles count="1"><input semantic="VERTEX" source="#v" offset="0"/><p>0 1 2</p></triangles></mesh>
-</geometry></library_geometries><library_visual_scenes><visual_scene id="s"><node id="n"><instance_geometry url="#g"/>
+</geometry></library_geometries>
+<library_visual_scenes><visual_scene id="s"><node id="n"><instance_geometry url="#g"/>
 </node></visual_scene></library_visual_scenes><scene><instance_visual_scene url="#s"/></scene></COLLADA>"""
 IES = "IESNA:LM-63-2002\nTILT={tlt}\n1 -1 1 3 1 1 2 .1 .1 0\n1 1 20\n0 45 90\n0\n1 2 3\n"
 NRRD = "NRRD0005\ntype: float\ndimension: 3\nsizes: 2 2 2\nencoding: raw\ndata file: {raw}\n\n"
