@@ -106,9 +106,9 @@ def write_dataset(
 
     Examples
     --------
-    >>> scene = wf.Scene([wf.Sphere((0, 0, 0), 1, name="ball")], wf.Environment(1))
+    >>> scene = wf.Scene([wf.Box((0, 0, 0), 1, name="box")], wf.Environment(1))
     >>> cameras = wf.turntable(scene, 3, size=(16, 16))
-    >>> wf.write_dataset("balls", scene, cameras, spp=1, format=("coco", "bop"))
+    >>> wf.write_dataset("boxes", scene, cameras, spp=1, format=("coco", "bop"))
     3
     """
     refuse(settings, REFUSED)

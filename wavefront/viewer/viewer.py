@@ -52,6 +52,10 @@ class Viewer:
         Host and port of the server.
     token
         The token that the address of the page must have; "" for none.
+    renew
+        Makes a session of the scene as it is now; None where it cannot change.
+    state
+        Returns what differs once the scene has been changed; None if nobody is to look.
     tone
         The first tone curve.
     spp
