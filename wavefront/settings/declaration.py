@@ -187,8 +187,8 @@ class RenderSettings(TypedDict, total=False):
             "auto",
             '"studio", "softbox", "three_point", "cloudy", "daylight" or "even": adds the light of that name '
             'to the scene\'s own lights; `studio` describes them. "auto" adds "studio" to a scene without '
-            "light, and to a file whose own lights leave it black, with a warning, and nothing to others. None "
-            "adds nothing.",
+            "light, and to a file whose own lights leave it black, with a warning, and nothing to others. "
+            "None adds nothing.",
             option=f"light to add: {', '.join(LIGHTINGS)}, none, "
             f"or auto: {DEFAULT} for a scene without light",
             check=check_preset,
