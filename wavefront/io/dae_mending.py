@@ -11,7 +11,10 @@ import numpy as np
 from .text_lines import NUMBER
 
 NUMBERS = re.compile(rb"<(?:\w+:)?(?:p|h|vcount|float_array)\b[^>]*>([^<]*)<")
-MALFORMED = re.compile(rb"[^-+.eE\d\s]|[-+eE](?:\s|$)|\d[-+]|[-+.][-+]")  # pycollada reads up to these, or 0
+# pycollada reads up to a pair of these, or to something else than a number
+PAIRS = [a + b for a in (b"-", b"+") for b in (b"-", b"+", b" ", b"\n", b"\t")]
+PAIRS += [a + b for a in (b"e", b"E") for b in (b" ", b"\n", b"\t")]
+PAIRS += [b"%d" % digit + sign for digit in range(10) for sign in (b"-", b"+")]
 UNCHECKED = re.compile(rb"<(?:\w+:)?polygons\b")  # whose indices pycollada counts all together
 PRIMITIVES = ("triangles", "polylist", "polygons", "tristrips", "trifans")
 MOST = 2**31  # an index where nothing limits it
@@ -20,8 +23,12 @@ NO_NUMBER, NO_INDEX = "1e39", -1  # what has one of these is left out
 
 def is_doubtful(data: bytes) -> bool:
     """Return whether a text of numbers has something else, or pycollada does not check all indices."""
-    malformed = any(MALFORMED.search(found[1]) for found in NUMBERS.finditer(data))
-    return malformed or UNCHECKED.search(data) is not None
+    texts = (found[1] + b" " for found in NUMBERS.finditer(data))
+    return UNCHECKED.search(data) is not None or any(map(_is_malformed, texts))
+
+
+def _is_malformed(text: bytes) -> bool:
+    return bool(text.translate(None, b"0123456789-+.eE \t\r\n")) or any(pair in text for pair in PAIRS)
 
 
 def mended(data: bytes) -> bytes | None:

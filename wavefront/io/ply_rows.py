@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,6 +16,8 @@ from numpy.typing import NDArray
 from ..arrays.vec import Bools, Doubles, Ints
 from .ply_header import Element, Header, Property
 from .text_lines import NUMBER
+
+BYTE_ORDERS: dict[str, Literal["little", "big"]] = {"<": "little", ">": "big"}
 
 
 @dataclass
@@ -160,33 +162,35 @@ def _alike(element: Element, data: bytes, at: int, order: str) -> tuple[Rows, in
 
 def _length(field: bytes, each: Property, order: str) -> int:
     """Return the length of a list from its bytes."""
-    return int.from_bytes(field, "big" if order == ">" else "little", signed=each.length[0] == "i")
+    return int.from_bytes(field, BYTE_ORDERS[order], signed=each.length[0] == "i")
 
 
 def _unlike(element: Element, data: bytes, at: int, order: str) -> tuple[Rows, int]:
     """Return rows with lists of any lengths, and where they end."""
     lists = [each for each in element.properties if each.length]
-    widths = [int(each.length[1]) for each in lists]
-    gaps = _gaps(element.properties)
+    gaps, byteorder, end = _gaps(element.properties), BYTE_ORDERS[order], len(data)
+    steps = [
+        (gap, int(each.length[1]), each.size, each.length[0] == "i")
+        for gap, each in zip(gaps, lists, strict=False)
+    ]
     found: list[list[int]] = [[] for _ in lists]  # where the values of each list begin
     starts: list[int] = []
     while len(starts) < element.count:
         begins, place = [], at
-        for each, gap, width in zip(lists, gaps, widths, strict=False):
+        for gap, width, size, signed in steps:
             place += gap + width
             begins.append(place)
-            length = _length(data[place - width : place], each, order)
-            place = place + length * each.size if length >= 0 else len(data) + 1
+            length = int.from_bytes(data[place - width : place], byteorder, signed=signed)
+            place = place + length * size if length >= 0 else end + 1
         place += gaps[-1]
-        if place > len(data):
+        if place > end:
             break
         starts.append(at)
         for each_found, begin in zip(found, begins, strict=True):
             each_found.append(begin)
         at = place
-    return _gathered(
-        element, data, order, np.array(starts, np.intp), [np.array(b, np.intp) for b in found]
-    ), at
+    lists_at = [np.array(each, np.intp) for each in found]
+    return _gathered(element, data, order, np.array(starts, np.intp), lists_at), at
 
 
 def _gaps(properties: list[Property]) -> list[int]:
