@@ -11,10 +11,21 @@ import numpy as np
 from .text_lines import NUMBER
 
 NUMBERS = re.compile(rb"<(?:\w+:)?(?:p|h|vcount|float_array)\b[^>]*>([^<]*)<")
-# pycollada reads up to a pair of these, or to something else than a number
-PAIRS = [a + b for a in (b"-", b"+") for b in (b"-", b"+", b" ", b"\n", b"\t")]
-PAIRS += [a + b for a in (b"e", b"E") for b in (b" ", b"\n", b"\t")]
-PAIRS += [b"%d" % digit + sign for digit in range(10) for sign in (b"-", b"+")]
+# classes of characters: 0 digits and points, 1 signs, 2 exponents, 3 blanks, 4 all others
+CLASSES = bytes(
+    0
+    if char in b"0123456789."
+    else 1
+    if char in b"+-"
+    else 2
+    if char in b"eE"
+    else 3
+    if char in b" \t\r\n"
+    else 4
+    for char in range(256)
+)
+# pairs of classes, 5 · first + second, that no number has: pycollada reads up to these, or 0
+NO_PAIRS = np.isin(np.arange(25), [1, 6, 7, 8, 12, 13, 17, *range(4, 25, 5), *range(20, 25)])
 UNCHECKED = re.compile(rb"<(?:\w+:)?polygons\b")  # whose indices pycollada counts all together
 PRIMITIVES = ("triangles", "polylist", "polygons", "tristrips", "trifans")
 MOST = 2**31  # an index where nothing limits it
@@ -28,7 +39,8 @@ def is_doubtful(data: bytes) -> bool:
 
 
 def _is_malformed(text: bytes) -> bool:
-    return bool(text.translate(None, b"0123456789-+.eE \t\r\n")) or any(pair in text for pair in PAIRS)
+    kinds = np.frombuffer(text.translate(CLASSES), np.uint8)
+    return bool(NO_PAIRS[5 * kinds[:-1] + kinds[1:]].any())
 
 
 def mended(data: bytes) -> bytes | None:
