@@ -866,6 +866,10 @@ ROW = "0 0 0\n1 0 0\n0 1 0\n{}3 0 1 2\n"
             ply(1, ROW.format("").replace("1 0 0", "1 0 0 5")),
             "1 row of vertex with more words, first: line 11",
         ),
+        (
+            ply(1, ROW.format("2 2\n")).replace("vertex 3", "vertex 4"),
+            "1 row of vertex with too few or malformed words, first: line 13; left out",
+        ),
     ],
 )
 def test_damaged_rows_of_ply_are_left_out(write, data, message):

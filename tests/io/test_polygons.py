@@ -17,6 +17,7 @@ SQUARE = [(-1, -1), (1, -1), (1, 1), (-1, 1)]
 WALL = [*SQUARE, SQUARE[0], *RING, RING[0]]  # a window, joined to the wall by a seam
 COMB = [(0, 0), (7, 0), *((x, y) for x in range(7, 0, -1) for y in ((1, 3) if x % 2 else (3, 1))), (0, 1)]
 SPIRAL = [(0, 0), (5, 0), (5, 5), (1, 5), (1, 2), (3, 2), (3, 3), (2, 3), (2, 4), (4, 4), (4, 1), (0, 1)]
+TURNS = [np.linalg.matrix_power(np.array([[0, 1], [-1, 0]]), k) for k in range(4)]
 POLYGONS = {"L": L, "dart": DART, "wall": WALL, "comb": COMB, "spiral": SPIRAL}
 
 
@@ -102,6 +103,19 @@ def test_a_circle_of_float32_stays_a_fan():
     points = (np.stack([np.cos(angles), np.sin(angles), 0 * angles], 1) + 3).astype(np.float32).astype(float)
     found = triangulate(points, np.arange(2048), np.array([2048]))
     assert np.array_equal(found.corner, fans(np.array([2048])).corner)
+
+
+def test_corners_on_a_line_but_for_rounding_stay_in_a_fan():
+    """Those of float32 are up to 1e-7 of the size on either side of it."""
+    side = np.linspace(-1, 1, 17)[:-1]
+    square = np.concatenate([np.stack([side, 0 * side - 1], 1) @ turn for turn in TURNS])
+    turn = np.array([[np.cos(0.3), np.sin(0.3)], [-np.sin(0.3), np.cos(0.3)]])
+    points = np.pad((square @ turn).astype(np.float32), ((0, 0), (0, 1))).astype(float)
+    points = np.roll(points, 5, 0)
+    bent = areas(points, fans(np.array([64])).corner)[:, 2]
+    assert bent.min() < 0  # which counts as 0
+    found = triangulate(points, np.arange(64), np.array([64]))
+    assert set(map(tuple, found.corner)) <= set(map(tuple, fans(np.array([64])).corner))
 
 
 @pytest.mark.parametrize(
