@@ -140,6 +140,21 @@ def test_only_scenes_with_narrow_lobes_have_the_record() -> None:
     assert [*found.image.errors] == ["direct"]  # it is no part of the light
 
 
+def test_points_that_met_no_narrow_lobe_have_that_of_the_others() -> None:
+    mirror = wf.Rectangle((-1, 2, 1), (2, 0, 0), (0, 0, -2), material=wf.Mirror(1))
+    wall = wf.Rectangle((-9, 9, -9), (18, 0, 0), (0, 0, 18), material=BLACK, emission=1)
+    far = (0, 1, 8)
+    found = wf.measure([mirror, wall], [far, (0, 1.9, 0)], UP, spp=8, **QUIET)
+    other, near = narrow_of(found)
+    assert near > 0.9 * np.pi
+    assert other == 0
+    alone = wf.measure([mirror, wall], [far], UP, spp=8, **QUIET)
+    more = found.interval()[1][0] - alone.interval()[1][0]
+    assert more == pytest.approx(-np.log(0.05) / 8 * near / 2, rel=0.3)
+    assert alone.reliable.tolist() == [True]
+    assert found.reliable.tolist() == [False, False]
+
+
 def test_a_sensor_that_looks_into_a_mirror_sees_it_surely() -> None:
     """A path that has met no rough surface misses no lamp that it points at."""
     mirror = wf.Rectangle((-1, 0, -1), (2, 0, 0), (0, 0, 2), material=wf.Mirror(1))

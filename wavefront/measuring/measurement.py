@@ -176,12 +176,17 @@ class Measurement(Answers):
         return (sums / np.maximum(count, 1)).take(tile, 0)
 
     def _unseen(self, confidence: float) -> Doubles:
-        """Return the light (n, 3) that narrow lobes may bring, and that no sample has met, as radiance."""
+        """Return the light (n, 3) that narrow lobes may bring, and that no sample has met, as radiance.
+
+        A point of which no path has met such a lobe may still have as much as those near it.
+        """
         narrow = self.image.layers.get(NARROW)
         if narrow is None:
             return np.zeros(self.value.shape)
-        chance = rule_of_three(confidence, self.samples)
-        return (chance * self._rows(narrow))[:, None] * np.array(self.metadata[BRIGHTEST])
+        own = self._rows(narrow).astype(np.float64)[:, None]
+        typical = np.maximum(own, self._near(own, np.ones_like(own, np.bool_)))
+        chance = rule_of_three(confidence, self.samples)[:, None]
+        return np.asarray(chance * typical * np.array(self.metadata[BRIGHTEST]))
 
     def _scaled(self, values: Doubles) -> Doubles:
         """Return values (n, 3) of pixels as power where the sensors are surfaces."""
