@@ -366,6 +366,14 @@ def mutate_dae(data: bytes, random: Random) -> bytes:
     return random.choice((mutate_numbers, mutate_tokens))(data, random)
 
 
+def mutate_usdc(data: bytes, random: Random) -> bytes:
+    """Change counts and offsets in the header, in the table of contents at its end, or anywhere."""
+    kind = random.randrange(3)
+    if kind == 0:
+        return mutate_words(data, random, 8, 88)
+    return mutate_words(data, random, len(data) - 400 if kind == 1 else 88)
+
+
 MUTATIONS: dict[str, Mutation] = {
     "obj": mutate_tokens,
     "mtl": mutate_tokens,
@@ -384,6 +392,11 @@ MUTATIONS: dict[str, Mutation] = {
     "hdr": mutate_hdr,
     "npy": mutate_npy,
     "npz": mutate_npz,
+    **dict.fromkeys(("ies", "csv", "epw", "usda", "nrrd"), mutate_tokens),
+    "mtlx": mutate_dae,
+    "usdc": mutate_usdc,
+    "usdz": mutate_words,
+    "vol": mutate_words,
     **dict.fromkeys(("tga", "tif", "tiff", "webp", "gif", "ppm", "pfm"), mutate_words),
 }
 

@@ -16,6 +16,7 @@ import warnings
 import zlib
 from collections import Counter
 from functools import partial
+from importlib.util import find_spec
 from pathlib import Path
 
 import numpy as np
@@ -31,6 +32,10 @@ from wavefront.codecs.image_data import ImageData
 from wavefront.codecs.images import read_image, read_picture, write_image
 from wavefront.core.errors import SceneError
 from wavefront.io.load import load
+from wavefront.io.materialx import load_materialx
+from wavefront.io.volumes import load_grid
+from wavefront.lights import IESLight
+from wavefront.measuring import load_points, load_weather
 from wavefront.shapes import Cylinders, Sphere, Spheres
 
 MEMORY = 3 << 30  # bytes
@@ -43,6 +48,7 @@ SCENES = {
     "ball.xml": "s.xml",
     "m.serialized": "s.xml",
     "more.pbrt": "s.pbrt",
+    "more.usda": "s.usda",
 }  # which refer to these files
 NUMBERS = (b"\xff\xff\xff\xff", b"\0\0\0\0", b"\xff\xff\xff\x7f", b"\0\0\0\x80")
 OBJ = "mtllib s.mtl\nv 0 0 0\nv 1 0 0\nv 0 1 0\nvt 0 0\nvt 1 0\nvn 0 0 1\nusemtl m\nf 1/1/1 2/2/1 3/1/1\n"
@@ -79,6 +85,71 @@ BALL = """<scene version="0.6.0"> <shape type="sphere"> <float name="radius" val
 <bsdf type="diffuse"> <texture type="checkerboard" name="diffuseReflectance"> <float name="uscale" value="2"/>
 </texture> </bsdf> </bsdf> </shape> <shape type="obj"> <string name="filename" value="m.obj"/> </shape>
 </scene>"""
+USD = """#usda 1.0
+(
+ defaultPrim = "a"
+ metersPerUnit = 0.1
+ subLayers = [@more.usda@]
+)
+def Xform "a" (instanceable = true)
+{
+ double3 xformOp:translate = (1, 2, 3)
+ uniform token[] xformOpOrder = ["xformOp:translate"]
+ def Mesh "m" (prepend apiSchemas = ["MaterialBindingAPI"])
+ {
+  int[] faceVertexCounts = [4, 3]
+  int[] faceVertexIndices = [0, 1, 2, 3, 0, 1, 2]
+  point3f[] points = [(0, 0, 0), (2, 0, 0), (2, 1, 0), (0, 1, 0)]
+  texCoord2f[] primvars:st = [(0, 0), (1, 0), (1, 1), (0, 1)] (interpolation = "vertex")
+  color3f[] primvars:displayColor = [(1, 0, 0)]
+  rel material:binding = </paint>
+ }
+ def Sphere "s"
+ {
+  double radius.timeSamples = { 0: 1, 1: 2 }
+ }
+}
+def PointInstancer "p" (references = @more.usda@</x>)
+{
+ rel prototypes = [</a>]
+ int[] protoIndices = [0, 0]
+ point3f[] positions = [(0, 0, 0), (1, 0, 0)]
+}
+def Material "paint"
+{
+ token outputs:surface.connect = </paint/shader.outputs:surface>
+ def Shader "shader"
+ {
+  uniform token info:id = "UsdPreviewSurface"
+  color3f inputs:diffuseColor.connect = </paint/image.outputs:rgb>
+  token outputs:surface
+ }
+ def Shader "image"
+ {
+  uniform token info:id = "UsdUVTexture"
+  asset inputs:file = @t.png@
+  float3 outputs:rgb
+ }
+}
+def RectLight "l"
+{
+ float inputs:intensity = 3
+}
+def Camera "c"
+{
+ float fStop = 2
+}
+"""
+LUMINAIRE = "IESNA:LM-63-2002\nTILT=INCLUDE\n1\n2\n0 90\n1 0.5\n"
+LUMINAIRE += "1 -1 1 3 2 1 2 .1 .1 0\n1 1 20\n0 45 90\n0 90\n1 2 3\n3 2 1\n"
+WEATHER = "LOCATION,Munich,,DEU,IWEC,108660,48.13,11.7,1.0,529.0\n" + "X\n" * 7
+WEATHER += "".join(f"1999,6,21,{hour},60,f{',1' * 8},{hour},5,0\n" for hour in range(1, 25))
+POINTS = "x,y,z\n" + "".join(f"{i},0,0.8\n" for i in range(9))
+PAINT = """<materialx version="1.38"><image name="i" type="color3"><input name="file" type="filename"
+value="t.png"/></image><standard_surface name="s" type="surfaceshader"><input name="base_color" type="color3"
+nodename="i"/><input name="metalness" type="float" value="0.5"/></standard_surface> <surfacematerial name="m"
+type="material"><input name="surfaceshader" type="surfaceshader" nodename="s"/></surfacematerial>
+</materialx>"""
 MTL = "newmtl m\nKd 1 1 1\nmap_Kd -s 1 1 1 t.png\nPr 0.3\nd 0.5\nKe 1 1 1\n"
 
 
@@ -105,6 +176,7 @@ def make_seeds(folder):
     )
     build.gltf(folder / "m.gltf")
     build.glb(folder / "m.glb")
+    make_others(folder)
     for extension in ("png", "jpg", "exr", "hdr", "npy"):
         write_image(folder / f"t.{extension}", np.random.default_rng(0).random((9, 11, 3)))
     make_pictures(folder)
@@ -136,6 +208,43 @@ def make_pictures(folder):
     OpenEXR.File(header, channels).write(str(folder / "t.layers.exr"))
 
 
+def make_others(folder):
+    """Write files of luminaires, weather, points, grids and materials, and of USD where it is installed."""
+    (folder / "l.ies").write_text(LUMINAIRE)
+    (folder / "p.csv").write_text(POINTS)
+    (folder / "m.mtlx").write_text(PAINT)
+    if find_spec("pvlib"):
+        (folder / "w.epw").write_text(WEATHER)
+    grid = np.random.default_rng(2).random((3, 4, 5), np.float32)
+    np.save(folder / "g.npy", grid)
+    np.savez(folder / "g.npz", a=grid)
+    head = struct.pack("<3sBi4i6f", b"VOL", 3, 1, 5, 4, 3, 1, 0, 0, 0, 1, 1, 1)
+    (folder / "g.vol").write_bytes(head + grid.tobytes())
+    if find_spec("nrrd"):
+        text = "NRRD0005\ntype: float\ndimension: 3\nsizes: 5 4 3\nendian: little\nencoding: raw\n"
+        text += "spacings: 1 2 3\n\n"
+        (folder / "g.nrrd").write_bytes(text.encode() + grid.tobytes())
+    if find_spec("pxr"):
+        from pxr import Sdf, UsdUtils
+
+        (folder / "s.usda").write_text(USD)
+        (folder / "more.usda").write_text('#usda 1.0\nover "a"\n{\n}\ndef Sphere "x"\n{\n}\n')
+        write_image(folder / "t.png", np.ones((4, 4, 3)))
+        layer = Sdf.Layer.FindOrOpen(str(folder / "s.usda"))
+        layer.Export(str(folder / "s.usdc"))
+        UsdUtils.CreateNewUsdzPackage(str(folder / "s.usdc"), str(folder / "s.usdz"))
+
+
+# readers of what is no scene and no picture
+OTHERS = {
+    "l.ies": lambda path: IESLight(path, (0, 2, 0)).lumens,
+    "p.csv": load_points,
+    "w.epw": load_weather,
+    "m.mtlx": load_materialx,
+    **dict.fromkeys(("g.npy", "g.npz", "g.vol", "g.nrrd"), load_grid),
+}
+
+
 def damage(data, rng):
     """Change bytes, put words in, cut, or repeat a part."""
     for _ in range(rng.choice((1, 1, 2, 5))):
@@ -159,7 +268,9 @@ def damage(data, rng):
 def attempt(folder, name):
     """Load a file and return whether it loads; only a SceneError may stop it."""
     try:
-        if name.startswith("t."):
+        if name in OTHERS:
+            OTHERS[name](folder / name)
+        elif name.startswith("t."):
             assert read_image(folder / name).ndim == 3
         elif name.startswith("p."):
             assert read_picture(folder / name).rgb.shape[2] == 3

@@ -116,8 +116,9 @@ def place_meshes(name: str, raws: list[RawMesh], places: Places, losses: Losses)
 
 def moved_raw(raw: RawMesh, matrix: Matrix) -> RawMesh:
     """Return a mesh moved by a (4, 4) matrix."""
-    vertices, faces, normals = moved(matrix, raw.vertices, raw.faces, raw.normals)
-    tangents = moved_tangents(matrix, raw.tangents)
+    with np.errstate(all="ignore"):  # what is not finite is found, and said, where the mesh is built
+        vertices, faces, normals = moved(matrix, raw.vertices, raw.faces, raw.normals)
+        tangents = moved_tangents(matrix, raw.tangents)
     return replace(raw, vertices=vertices, faces=faces, normals=normals, tangents=tangents)
 
 

@@ -52,12 +52,15 @@ class Layers:
         known = Sdf.Layer.Find(name)
         if known:
             known.Reload(force=True)  # the file may have changed since
+        layer = None
         try:
-            return Sdf.Layer.FindOrOpen(name)
+            layer = Sdf.Layer.FindOrOpen(name)
         except RuntimeError:
             if name == self.root:
-                raise
-            return None  # the stage says why
+                raise  # of others the stage says why
+        if layer is None and name == self.root:
+            raise SceneError(f"{self._files.name}: is no file of USD that can be read")
+        return layer
 
     def _check(self, layer: Any) -> None:
         """Take out of a layer what refers to files that may not be read, and have all others opened."""

@@ -93,9 +93,9 @@ def _read(files: SceneFiles, time: float | None) -> Contents:
         layers.check_size()
         stage = Usd.Stage.Open(layers.open[layers.root])
         return _Reader(files, stage, time).contents()
-    except SceneError:
+    except (SceneError, MemoryError):
         raise
-    except (RuntimeError, TypeError, ValueError, IndexError) as error:  # also those of pxr.Tf
+    except Exception as error:  # of pxr.Tf, and of any type where values are of others than the schema has
         raise SceneError(f"{files.name}: cannot be read: {said(error)}") from error
 
 
