@@ -13,7 +13,7 @@ import pytest
 from scripts import children, eventually, runs, start_python, wait_for
 
 import wavefront as wf
-from wavefront.io.usd.child import CHILD
+from wavefront.io.usd.child import CHILD, Child
 
 pytest.importorskip("pxr")
 H = "#usda 1.0\n"
@@ -270,3 +270,15 @@ def test_the_process_of_usd_core_ends_with_its_parent(tmp_path: Path) -> None:
     process.kill()
     process.communicate()
     assert eventually(lambda: not runs(child))
+
+
+@pytest.mark.slow
+def test_the_process_of_usd_core_imports_nothing_from_the_current_folder(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A scene may lie beside a module of a name that Python looks for."""
+    (tmp_path / "numpy.py").write_text("raise SystemExit(3)")
+    monkeypatch.chdir(tmp_path)
+    child = Child()
+    assert child.call("a.usda", 60, len, "abc") == 3
+    child.close()

@@ -92,7 +92,7 @@ class BackgroundDenoiser:
             if self._closed:
                 return None
             self._process = process = subprocess.Popen(
-                [sys.executable, "-c", COMMAND],
+                [sys.executable, "-P", "-c", COMMAND],
                 stdin=subprocess.PIPE,
                 stdout=subprocess.PIPE,
                 stderr=subprocess.PIPE,
