@@ -263,6 +263,36 @@ def test_a_plotter_is_seen_as_by_vtk(pyvista, parallel, size) -> None:
 
 
 @pytest.mark.slow
+def test_actors_are_as_they_are_shown(pyvista) -> None:
+    """Colors of points, logarithms, opacity by the scalars, blocks with common limits, styles."""
+    ball = pyvista.Sphere()
+    height = ball.points[:, 2].astype(float)
+
+    def shapes(data: Any, **arguments: Any) -> list[Any]:
+        plotter = pyvista.Plotter(off_screen=True)
+        plotter.add_mesh(data, **arguments)
+        return wf.from_pyvista(plotter).shapes
+
+    colors = np.random.default_rng(1).random((ball.n_points, 3))
+    (shown,) = shapes(ball.copy(), scalars=colors, rgb=True)
+    assert shown.colors[:, :3] == pytest.approx(wf.srgb(colors), abs=1e-6)
+    (shown,) = shapes(ball.copy(), scalars=10 ** (3 * height), log_scale=True)
+    assert shown.uvs[:, 0] == pytest.approx(height + 0.5, abs=1e-5)
+    (shown,) = shapes(ball.copy(), scalars=height, opacity="linear")
+    assert shown.material.alpha.limits() == pytest.approx((0, 1), abs=CODE)
+    ball["z"] = height
+    other = ball.translate((0, 0, 5))
+    other["z"] = height + 5
+    low, high = (shape.uvs[:, 0] for shape in wf.from_pyvista(pyvista.MultiBlock([ball, other])).shapes)
+    assert (low.min(), low.max()) == pytest.approx((0, 1 / 6))
+    assert (high.min(), high.max()) == pytest.approx((5 / 6, 1))
+    assert isinstance(shapes(ball, style="wireframe")[0], wf.Capsules)
+    assert isinstance(shapes(ball, style="points")[0], wf.Spheres)
+    with pytest.raises(wf.SceneError, match="the plotter shows no dataset"):
+        wf.from_pyvista(pyvista.Plotter(off_screen=True))
+
+
+@pytest.mark.slow
 def test_accessors_of_pyvista(pyvista) -> None:
     import_module("wavefront.plugins.pyvista_accessors")
     ball = pyvista.Sphere()
@@ -275,3 +305,13 @@ def test_accessors_of_pyvista(pyvista) -> None:
     grid = pyvista.ImageData(dimensions=(3, 3, 3))
     grid["v"] = np.arange(27.0)
     assert len(grid.wavefront.scene().shapes[0].faces) == 48
+
+
+def test_opacity_of_a_colormap_is_shown() -> None:
+    faint = matplotlib.colors.ListedColormap([(1, 0, 0, 0.5), (0, 0, 1, 1)])
+    camera = wf.Camera.orthographic((0, 0.03, 5), (0, 0.03, 0), height=0.5, size=(16, 8))
+    image = render(
+        (PLANE, TRIANGLES), 64, scalars="x", cmap=faint, camera=camera, aovs="alpha", background="transparent"
+    )
+    assert image.alpha[:, :7].mean() == pytest.approx(128 / 255, abs=0.05)
+    assert image.alpha[:, 9:].min() == 1

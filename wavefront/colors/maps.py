@@ -26,10 +26,14 @@ class ColorMap:
     table: NDArray[np.uint8]  # (k, 4) sRGB and opacity
     limits: tuple[float, float]
     no_number: tuple[int, ...] = NO_NUMBER
+    log: bool = False  # whether the logarithms of the numbers are what counts
 
     def places(self, values: Doubles) -> Doubles:
         """Return how far along the table numbers (...) are, 0 to 1 within it; NaN where one is not finite."""
         low, high = self.limits
+        if self.log:
+            with np.errstate(divide="ignore", invalid="ignore"):
+                values, (low, high) = np.log10(values), np.log10(self.limits).tolist()
         place = np.clip((values - low) / ((high - low) or 1.0), -FAR, FAR)
         return np.where(np.isfinite(values), place, np.nan)
 

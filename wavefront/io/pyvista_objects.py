@@ -35,6 +35,7 @@ class Look:
     coloring: Coloring | None = None  # its scalars; None for the active ones
     colors: ColorMap | None = None  # in place of those of the coloring
     plain: bool = False  # without scalars and colors
+    rgb: bool = False  # three or four numbers are colors
     material: Material | None = None  # of what has no scalars and colors
     opacity: float = 1.0
 
@@ -112,7 +113,9 @@ def shapes_of(data: Any, smooth: bool | float | str, look: Look) -> list[Shape]:
         As `from_pyvista` does.
     """
     if hasattr(data, "n_blocks"):
-        return [shape for block in data if block is not None for shape in shapes_of(block, smooth, look)]
+        blocks = _leaves(data)
+        look = _with_common_limits(blocks, look)
+        return [shape for block in blocks for shape in shapes_of(block, smooth, look)]
     data, look = _with_array(data, look)
     if not hasattr(data, "faces") and hasattr(data, "extract_surface"):
         data = _surface(data)
@@ -126,6 +129,27 @@ def shapes_of(data: Any, smooth: bool | float | str, look: Look) -> list[Shape]:
     return (
         [_lines(data, points, lines, look)] if lines.size else spheres(NAME, points, _of_points(data, look))
     )
+
+
+def _leaves(data: Any) -> list[Any]:
+    """Return the datasets of blocks, which may have blocks themselves."""
+    if not hasattr(data, "n_blocks"):
+        return [] if data is None else [data]
+    return [leaf for block in data for leaf in _leaves(block)]
+
+
+def _with_common_limits(blocks: list[Any], look: Look) -> Look:
+    """Return the look of several datasets, whose scalars have the limits of all of them."""
+    coloring = look.coloring or Coloring(None)
+    if look.plain or look.colors is not None or coloring.clim is not None:
+        return look
+    arrays = [_array(block, look) for block in blocks if hasattr(block, "point_data")]
+    values = [lengths("scalars", each) for each in arrays if each is not None and each.dtype != np.uint8]
+    some = [each[np.isfinite(each)] for each in values if np.isfinite(each).any()]
+    if not some:
+        return look
+    limits = min(each.min() for each in some), max(each.max() for each in some)
+    return replace(look, coloring=replace(coloring, clim=limits))
 
 
 def _with_array(data: Any, look: Look) -> tuple[Any, Look]:
@@ -249,10 +273,12 @@ def _shown(data: Any, look: Look) -> Shown | None:
     if array is None:
         return None
     chosen = look.coloring is not None and look.coloring.scalars is not None
-    if array.ndim == 2 and array.shape[1] in (3, 4) and (not chosen or array.dtype == np.uint8):
+    if array.ndim == 2 and array.shape[1] in (3, 4) and (not chosen or look.rgb or array.dtype == np.uint8):
         if array.dtype == np.uint8:
             return Shown(opaque(srgb(array)), None)
         if array.dtype.kind == "f" and 0 <= array.min() <= array.max() <= 1:
+            if look.rgb:
+                return Shown(opaque(srgb(array)), None)
             warn_caller(f"{NAME}: {_name(data, look)!r} is taken for colors in sRGB, as rgb=True of PyVista")
             return Shown(opaque(srgb(array)), None)
     values = lengths("scalars", array)

@@ -104,11 +104,16 @@ def _look(actor: Any, mapper: Any, prop: Any) -> Look:
     coloring = Coloring(name) if name else None
     table = getattr(mapper, "lookup_table", None)
     if coloring is None or table is None or str(mapper.color_mode) == "direct":
-        return Look(material=material, opacity=opacity)
+        return Look(coloring, material=material, opacity=opacity, rgb=True)
     codes = np.asarray(table.values, np.uint8)
     no_number = tuple(round(255 * part) for part in table.GetNanColor())
     low, high = (float(limit) for limit in mapper.scalar_range)
-    return Look(coloring, ColorMap(codes, (low, high), no_number), material=material, opacity=opacity)
+    return Look(
+        coloring,
+        ColorMap(codes, (low, high), no_number, bool(table.log_scale)),
+        material=material,
+        opacity=opacity,
+    )
 
 
 def _material(actor: Any, prop: Any, opacity: float) -> Material:

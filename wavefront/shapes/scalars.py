@@ -65,12 +65,10 @@ def map_material(colors: ColorMap, opacity: float = 1.0, name: str | None = None
     picture = colors.picture()
     alpha: Any = None if opacity == 1 else opacity
     if (picture[..., 3] < 255).any():
-        alpha = Texture(
-            picture[..., 3] / np.float32(255) * np.float32(opacity), filter="nearest", wrap="clamp"
-        )
-    return Material(
-        Diffuse(Texture(picture[..., :3], filter="nearest", wrap="clamp")), alpha=alpha, name=name
-    )
+        values = picture[..., 3] / np.float32(255) * np.float32(opacity)
+        alpha = Texture(values, channel=0, filter="nearest", wrap="clamp")
+    shown = Texture(picture[..., :3], filter="nearest", wrap="clamp")
+    return Material(Diffuse(shown), alpha=alpha, name=name)
 
 
 def with_scalars(shape: Shape, coloring: Coloring) -> Shape:
