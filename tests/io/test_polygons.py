@@ -316,6 +316,9 @@ WALLS = [
     [SQUARE, RING[::-1]],
     [SQUARE[::-1], RING],
     [moved(SQUARE, 0, 0, 4), moved(RING, -2, -2), moved(RING[::-1], 2, 2), moved(RING, 2, -2, 2)],
+    # one behind another, seen from the wall
+    [moved(SQUARE, 0, 0, 9), moved(RING, 0, 0), *(moved(RING, x, y, 4) for x, y in ((5, 0), (-5, 0)))],
+    [moved(SQUARE, 0, 0, 9), moved(RING, 0, 0), *(moved(RING, 0, y, 8) for y in (4.6, -4.6))],
 ]
 
 

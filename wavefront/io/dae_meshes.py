@@ -14,7 +14,7 @@ from ..shapes.transform import IDENTITY, Matrix
 from .appearance import MaterialSpec, assign_material, from_srgb
 from .contents import Contents
 from .placing import Places
-from .polygons import seamed, triangulate
+from .polygons import triangulate, with_holes
 from .repair import RawMesh, Table
 from .sources import SceneFiles
 from .trimesh_import import import_trimesh
@@ -88,9 +88,23 @@ class DaeMeshes:
         if not there.all():
             counts = counts[: there.argmin()]
             self._note(f"{plural(len(there) - len(counts), 'polygon')} without indices", done="left out")
-        rings = [_seamed(ring, points, offset) for ring in _with_holes(primitive, rows.shape[1])]
-        rows = np.concatenate([rows[: counts.sum()], *rings])
-        return self._sound(rows, np.append(counts, [len(ring) for ring in rings]).astype(np.intp))
+        found = _with_holes(primitive, rows.shape[1])
+        cut = [self._cut(rings, points, offset, rows.shape[1]) for rings in found]
+        rows = np.concatenate([rows[: counts.sum()], *cut])
+        return self._sound(rows, np.append(counts, [3] * (sum(map(len, cut)) // 3)).astype(np.intp))
+
+    def _cut(self, rings: list[Ints], points: Table, offset: int, width: int) -> Ints:
+        """Return the rows at the corners of the triangles of a polygon with holes."""
+        whole = [ring for ring in rings if len(ring) > 2 and (ring >= 0).all()]
+        corners = (
+            with_holes([points[ring[:, offset]] for ring in whole])
+            if whole and len(whole) == len(rings)
+            else []
+        )
+        if not len(corners):
+            self._note("a polygon with holes", value="damaged", done="left out")
+            return np.zeros((0, width), np.intp)
+        return np.concatenate(rings)[np.ravel(corners)]
 
     def _sound(self, rows: Ints, counts: Ints) -> tuple[Ints, Ints]:
         """Return the polygons that have three corners and no index below 0."""
@@ -143,8 +157,3 @@ def _with_holes(primitive: Any, width: int) -> list[list[Ints]]:
             rings = [np.array(text.split(), np.intp) for text in texts]
             found.append([ring[: len(ring) // width * width].reshape(-1, width) for ring in rings])
     return found
-
-
-def _seamed(rings: list[Ints], points: Table, offset: int) -> Ints:
-    """Return the rows of a polygon whose holes are joined to it by seams."""
-    return np.concatenate(rings)[seamed([points[ring[:, offset]] for ring in rings])]

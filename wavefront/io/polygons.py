@@ -110,36 +110,18 @@ def triangulate(
     return Triangles(*map(np.concatenate, parts))
 
 
-def seamed(rings: list[Doubles]) -> Ints:
-    """Return a polygon with holes as one polygon: the order of the corners of all its rings.
-
-    A seam joins each hole to the rest at the two corners that are closest, which come twice.
+def with_holes(rings: list[Doubles]) -> Ints:
+    """Return the triangles (m, 3) of a polygon with holes, which wind as the polygon does.
 
     Parameters
     ----------
     rings
         The positions (n, 3) of the corners of the outer ring, and of each hole, which may wind either way.
+        The triangles count the corners of all.
     """
-    outer, *holes = rings
-    order, points = np.arange(len(outer)), np.concatenate(rings)
-    start = len(outer)
-    for hole in holes:
-        own = np.arange(start, start + len(hole))
-        start += len(hole)
-        if len(hole) < 3:
-            continue
-        if _normal(hole) @ _normal(outer) > 0:
-            own = own[::-1]
-        apart = np.square(points[order][:, None] - points[own]).sum(2)
-        here, there = np.unravel_index(apart.argmin(), apart.shape)
-        around = np.roll(own, -int(there))
-        order = np.concatenate([order[: here + 1], around, around[:1], order[here:]])
-    return order
-
-
-def _normal(ring: Doubles) -> Doubles:
-    """Return twice the area of a polygon (n, 3) as a vector."""
-    return np.asarray(np.cross(ring, np.roll(ring, -1, 0)).sum(0))
+    outer = rings[0]
+    normal = np.asarray(np.cross(outer, np.roll(outer, -1, 0)).sum(0))
+    return _ears(np.concatenate(rings), normal, np.cumsum([len(ring) for ring in rings]))
 
 
 def _are_odd(points: Doubles, corners: Ints, counts: Ints) -> Bools:
@@ -191,21 +173,25 @@ def _cut(points: Doubles, corners: Ints, counts: Ints, normal: Doubles, concave:
     area, _ = _areas(points, corners[halves].reshape(-1, 3))
     sound = (dot(area, np.repeat(normal[:, quads], 2, 1)) > 0).reshape(-1, 2).all(1)
     corner, polygon = [halves[sound].reshape(-1, 3)], [np.repeat(quads[sound], 2)]
-    for number in concave[(counts[concave] > 4) & (counts[concave] <= MOST)].tolist():
+    for number in concave[counts[concave] > 4].tolist():
         own = np.arange(first[number], first[number] + counts[number])
         corner.append(own[_ears(points[corners[own]], normal[:, number])])
         polygon.append(np.full(len(corner[-1]), number))
     return Triangles(np.concatenate(corner), np.concatenate(polygon))
 
 
-def _ears(points: Doubles, normal: Doubles) -> Ints:
-    """Return the triangles (m, 3) of a polygon with corners at points (n, 3), seen along its normal."""
+def _ears(points: Doubles, normal: Doubles, ends: Ints | None = None) -> Ints:
+    """Return the triangles (m, 3) of a polygon with corners at points (n, 3), seen along its normal.
+
+    `ends` are those of its rings, the outer one and holes.
+    """
     from mapbox_earcut import triangulate_float64
 
     axis = int(np.abs(normal).argmax())
     seen = (points - points[0])[:, [(axis + 1) % 3, (axis + 2) % 3][:: 1 if normal[axis] > 0 else -1]]
     scale = np.abs(seen).max()
-    if not 0 < scale < np.inf:
+    if not 0 < scale < np.inf or len(points) > MOST:
         return np.zeros((0, 3), np.intp)
-    found = triangulate_float64(seen / scale, np.array([len(seen)], np.uint32))
+    ends = np.array([len(points)]) if ends is None else ends
+    found = triangulate_float64(np.ascontiguousarray(seen / scale), ends.astype(np.uint32))
     return found.astype(np.intp).reshape(-1, 3)
