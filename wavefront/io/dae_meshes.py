@@ -21,6 +21,8 @@ from .trimesh_import import import_trimesh
 from .trimesh_loading import Images, typed_errors
 from .trimesh_objects import material_spec
 
+NONE = np.zeros((0, 3), np.intp)  # triangles
+
 
 class DaeMeshes:
     """The meshes of a document: one for each primitive of each geometry that is placed."""
@@ -95,16 +97,12 @@ class DaeMeshes:
 
     def _cut(self, rings: list[Ints], points: Table, offset: int, width: int) -> Ints:
         """Return the rows at the corners of the triangles of a polygon with holes."""
-        whole = [ring for ring in rings if len(ring) > 2 and (ring >= 0).all()]
-        corners = (
-            with_holes([points[ring[:, offset]] for ring in whole])
-            if whole and len(whole) == len(rings)
-            else []
-        )
+        sound = bool(rings) and all(len(ring) > 2 and (ring >= 0).all() for ring in rings)
+        corners = with_holes([points[ring[:, offset]] for ring in rings]) if sound else NONE
         if not len(corners):
-            self._note("a polygon with holes", value="damaged", done="left out")
+            self._note("a polygon with damaged holes", done="left out")
             return np.zeros((0, width), np.intp)
-        return np.concatenate(rings)[np.ravel(corners)]
+        return np.concatenate(rings)[corners.ravel()]
 
     def _sound(self, rows: Ints, counts: Ints) -> tuple[Ints, Ints]:
         """Return the polygons that have three corners and no index below 0."""
