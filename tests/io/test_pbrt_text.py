@@ -303,3 +303,11 @@ def test_packed_files_are_refused_before_they_are_unpacked(tmp_path: Path, name:
     with pytest.raises(SceneError, match=rf"{name}: what it holds takes .*LoadLimits\.memory_bytes"):
         load(tmp_path, use, limits=wf.LoadLimits(memory_bytes=2**10))
     tracemalloc.stop()
+
+
+def test_a_file_that_is_included_often_allows_for_memory_once(tmp_path: Path) -> None:
+    (tmp_path / "more.pbrt").write_text("#" * 1000)
+    files = SceneFiles(tmp_path / "scene.pbrt", limits=wf.LoadLimits(memory_bytes=1))
+    for _ in range(3):
+        files.read(tmp_path / "more.pbrt")
+    assert files.budget.most == 1 + 128 * 1000

@@ -39,6 +39,7 @@ class Budget:
     def __init__(self, pixels: int = MAX_PIXELS, memory_bytes: int = MEMORY_BYTES) -> None:
         self.pixels = pixels
         self._most, self._charged = memory_bytes, 0
+        self._names: set[str] = set()  # of the files
 
     @classmethod
     def of(cls, data: bytes) -> Budget:
@@ -47,9 +48,11 @@ class Budget:
         budget.add_file(len(data))
         return budget
 
-    def add_file(self, size: int) -> None:
-        """Allow for the memory of a file of `size` bytes."""
-        self._most += PER_BYTE * size
+    def add_file(self, size: int, name: str | os.PathLike[str] = "") -> None:
+        """Allow for the memory of a file of `size` bytes; of one with a name only once."""
+        if not name or os.fspath(name) not in self._names:
+            self._most += PER_BYTE * size
+            self._names.add(os.fspath(name))
 
     @property
     def most(self) -> int:

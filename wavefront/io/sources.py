@@ -297,7 +297,7 @@ class SceneFiles:
             If it cannot be read, or a packed file is damaged or larger than `limits.unpacked_bytes`.
         """
         data = read_bytes(path, self.limits.file_bytes)
-        self.budget.add_file(len(data))
+        self.budget.add_file(len(data), path)
         return self._unpacked(path, data) if os.fspath(path).lower().endswith(GZIPPED) else data
 
     def _unpacked(self, path: PathLike, data: bytes) -> bytes:

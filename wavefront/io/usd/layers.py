@@ -84,7 +84,7 @@ class Layers:
         UsdUtils.ModifyAssetPaths(layer, checked)
         for error in wrong:  # they would not come through usd-core
             with self._files.losses.part():
-                raise error
+                raise type(error)(str(error).removeprefix(f"{self.root}: ")) from error
 
     def _evaluated(self, path: str) -> str:
         """Return the path that an expression with variables stands for."""
