@@ -76,6 +76,24 @@ def test_points_beside_glass_are_not_reliable() -> None:
     assert plain.reliable.mean() >= 0.9
 
 
+def test_events_that_other_points_met_raise_the_upper_limit() -> None:
+    """A point without noise, by itself and beside fifteen that a lamp half lights."""
+    lamp = wf.Sphere((20, 1, 0), 1, emission=50, material=BLACK)
+    block = wf.Rectangle((18, 1, -3), (0, 2, 0), (0, 0, 6), material=BLACK)
+    shade = wf.Rectangle((2, 0, -9), (0, 9, 0), (0, 0, 18), material=BLACK)
+    scene = wf.Scene([lamp, block, shade], [wf.Environment(0.2)])
+    calm, others = (0, 9.5, 0), [(10 + x, 0, 0) for x in range(15)]
+    alone = wf.measure(scene, [calm], UP, spp=16, reuse=False, **QUIET)
+    beside = wf.measure(scene, [calm, *others], UP, spp=16, reuse=False, **QUIET)
+    assert beside.value[0].tolist() == alone.value[0].tolist()
+    (low, high), (first, last) = alone.interval(), beside.interval()
+    assert first[0] == pytest.approx(low[0], rel=1e-9)
+    event = np.mean(
+        [v**2 / m for v, m in zip(beside.standard_error[1:, 1], beside.value[1:, 1], strict=True)]
+    )
+    assert last[0, 1] - high[0, 1] > event
+
+
 def test_few_samples_and_darkness_are_not_reliable() -> None:
     lamp = wf.Sphere((0, 3, 0), 0.5, emission=2, material=BLACK)
     scene = wf.Scene([lamp, scenes.box((9, 9, 9), (10, 10, 10), wf.Diffuse(0.5))])
@@ -127,6 +145,13 @@ def test_the_record_of_a_mirror_is_its_reflectance_times_pi() -> None:
     unseen = -np.log(0.05) / 16 * 0.9 * np.pi
     assert found.interval()[1][0, 1] >= (1 - 1e-6) * unseen
     assert not found.reliable.any()
+
+
+@pytest.mark.parametrize(("roughness", "narrow"), [(0.1, True), (0.9, False)])
+def test_reflections_are_narrow_by_their_density(roughness: float, narrow: bool) -> None:
+    above = wf.Plane((0, 1, 0), (0, -1, 0), material=wf.Conductor("gold", roughness=roughness))
+    found = wf.measure([above, wf.Sphere((0, -5, 0), 1, emission=1)], [(0, 0, 0)], UP, spp=64, **QUIET)
+    assert (narrow_of(found)[0] > 1) == narrow
 
 
 def test_only_scenes_with_narrow_lobes_have_the_record() -> None:
