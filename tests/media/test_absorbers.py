@@ -226,10 +226,35 @@ def floor(z: float) -> wf.Mesh:
     return wf.Rectangle((-4, -4, z), (8, 0, 0), (0, 8, 0))
 
 
+def bottle() -> wf.Mesh:
+    """A bottle of glass, with an outer and an inner wall that meet at its mouth."""
+    profile = np.array([(0, 0), (0.5, 0), (0.5, 1), (0.2, 1.4), (0.15, 1.4), (0.4, 1), (0.4, 0.1), (0, 0.1)])
+    turn = np.linspace(0, 2 * np.pi, 24, endpoint=False)
+    ring = np.stack([np.cos(turn), np.zeros(24), np.sin(turn)], 1)
+    vertices = (profile[:, None, :1] * ring + profile[:, None, 1:] * np.array([0, 1.0, 0])).reshape(-1, 3)
+    row, column = np.divmod(np.arange(7 * 24), 24)
+    a, b = row * 24 + column, row * 24 + (column + 1) % 24
+    faces = np.concatenate([np.stack([a, a + 24, b], 1), np.stack([b, a + 24, b + 24], 1)])
+    corners = vertices[faces]
+    solid = (
+        np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1) > 1e-9
+    )
+    return wf.Mesh(vertices, faces[solid], material=water(2, wf.Dielectric(1.5)))
+
+
+def prism() -> wf.Mesh:
+    corners = [(0, 0, 0), (1, 0, 0), (0.5, 0.9, 0), (0, 0, 2), (1, 0, 2), (0.5, 0.9, 2)]
+    faces = [(0, 2, 1), (3, 4, 5), (0, 1, 4), (0, 4, 3), (1, 2, 5), (1, 5, 4), (2, 0, 3), (2, 3, 5)]
+    return wf.Mesh(corners, faces, material=water(2, wf.Dielectric(1.5)))
+
+
 GLASS = wf.Dielectric(1.5)
 HALF = 1 - 1e-4
 CHOICES: dict[str, tuple[bool, list]] = {
     "a ball": (True, [ball(bsdf=GLASS), SKY]),
+    "a bottle": (True, [bottle(), SKY]),
+    "a bottle with something in it": (False, [bottle(), ball(at=(0, 0.6, 0), radius=0.1), SKY]),
+    "a prism": (True, [prism(), SKY]),
     "a ball on a floor": (True, [ball(), floor(-0.5), SKY]),
     "a ball sunk into the floor": (False, [ball(), floor(-0.4999), SKY]),
     "a cube above a floor": (True, [cube(), floor(-1.001), SKY]),
