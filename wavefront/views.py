@@ -15,6 +15,7 @@ from .image import Image
 from .io.to_scene import as_scene, choose_camera
 from .session import Session
 from .settings import RenderSettings, refuse, takes_settings, whole_number
+from .settings.checks import check_view
 
 MOST_VIEWS = 1_000_000  # on a turntable
 
@@ -107,6 +108,8 @@ def turntable(
     4
     """
     n = whole_number(1, MOST_VIEWS)("n", n)
+    if view is not None:
+        check_view("view", view)
     subject = as_scene(scene, None, False)
     axis = subject.vertical(up)
     camera, _ = choose_camera(subject, None, size, axis, view, fov, turning=True)

@@ -357,7 +357,7 @@ def test_gray_and_alpha() -> None:
     assert wf.Environment(gray).radiance.tolist() == expected
     assert wf.Environment(gray[:, :, None]).radiance.tolist() == expected
     assert wf.Environment(np.dstack([rgb, np.ones((2, 4))])).radiance.tolist() == expected
-    with pytest.warns(UserWarning, match="Environment image: 8 pixels are transparent; alpha is not used"):
+    with pytest.warns(UserWarning, match="Environment radiance: 8 pixels are transparent; alpha is not used"):
         assert wf.Environment(np.dstack([rgb, np.full((2, 4), 0.5)])).radiance.tolist() == expected
 
 
@@ -383,14 +383,17 @@ PICTURE = np.ones((2, 4, 3))
 BAD = {
     "NaN": (
         {"radiance": np.where(np.arange(4)[:, None] == 2, np.nan, PICTURE)},
-        r"Environment image: 2 pixels are not finite in float32, first: row 0, column 2, \[nan, nan, nan\]",
+        r"Environment radiance: 2 pixels .*, first: row 0, column 2, \[nan, nan, nan\]",
     ),
     "infinite": ({"radiance": PICTURE * np.inf}, "8 pixels are not finite"),
     "too large": ({"radiance": PICTURE * 1e39}, r"8 pixels are not finite in float32, .* \[inf, inf, inf\]"),
     "five channels": ({"radiance": np.ones((2, 4, 5))}, r"is float64 of shape \(2, 4, 5\); it must be"),
     "four axes": ({"radiance": np.ones((1, 2, 4, 3))}, r"shape \(1, 2, 4, 3\); it must be \(H, W, 3\)"),
     "text": ({"radiance": np.full((2, 4, 3), "x")}, "it must be"),
-    "black": ({"radiance": PICTURE * 0}, r"every pixel of the Environment is black; Environment\(0\) is"),
+    "black": (
+        {"radiance": PICTURE * 0},
+        r"Environment radiance is black in every pixel; Environment\(0\) is",
+    ),
     "no file": ({"radiance": "missing.exr"}, "missing.exr"),
     "no image": ({"radiance": "sky.obj"}, "extension is '.obj'; it must be one of"),
     "filter": (

@@ -73,7 +73,7 @@ BAD = {
     "sun": (
         wf.DirectionalLight((0, -1, 0), 1),
         {"lumens": 1},
-        "with_flux takes a PointLight, .*; got Direct",
+        "with_flux source must be a PointLight, .*, got Direct",
     ),
     "picture": (
         wf.SpotLight((0, 0, 0), 1, direction=(0, 1, 0), picture=np.ones((2, 2, 3))),

@@ -38,7 +38,7 @@ NUMBERS: dict[str, Callable[[Any], object]] = {
     "radii": lambda value: wf.Spheres(VERTICES, value),
     "reflectance": wf.Diffuse,
     "Environment": wf.Environment,
-    "(image|texture)": wf.Texture,
+    "Texture source": wf.Texture,
     "intensity": lambda value: wf.PointLight((0, 0, 0), value),
     "Camera origin": lambda value: wf.Camera.look_at(value, (0, 0, 0)),
     "up": lambda value: wf.render(scenes.everything(), 1, up=value),

@@ -112,5 +112,5 @@ def test_a_backdrop_may_be_an_image_and_hides_no_sun() -> None:
 
 
 def test_a_malformed_backdrop_is_refused() -> None:
-    with pytest.raises(wf.SceneError, match=r"^Environment radiance"):
+    with pytest.raises(wf.SceneError, match=r"^Environment backdrop"):
         wf.Environment(1, backdrop=(1, 2))

@@ -123,12 +123,12 @@ BAD = [
 ]
 ARRAYS = [np.zeros((3, 3))] * 4
 BAD_SCENES = [
-    (None, r"cannot render NoneType: give a wf.Scene, a path"),
+    (None, r"cannot render NoneType: scene must be a wf.Scene, a path"),
     (5, r"cannot render int"),
     ([], r"cannot render an empty list"),
     ([BALL, 5], r"cannot render int"),
     ("https://example.com/a.glb", r"^https://example.com/a.glb: there is no such file$"),
-    (ARRAYS, r"cannot render ndarray: give .* \(vertices, faces\)"),
+    (ARRAYS, r"cannot render ndarray: scene must be .* \(vertices, faces\)"),
     (([[0, 0, 0]], [[0, 0, 1]]), r"faces\[0\]\[2\] is 1; it must be in \[0, 0\]"),
     (([[0, 0, np.nan]] * 3, [[0, 1, 2]]), r"vertices\[0\]\[2\] is nan"),
     (([], []), r"must have shape \(n, 3\)|no faces"),

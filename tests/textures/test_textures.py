@@ -147,7 +147,7 @@ def test_from_a_file(tmp_path):
 @pytest.mark.parametrize(
     ("source", "arguments", "message"),
     [
-        (np.zeros((2, 2, 5)), {}, r"texture 'array' is float64 of shape \(2, 2, 5\)"),
+        (np.zeros((2, 2, 5)), {}, r"Texture source is float64 of shape \(2, 2, 5\)"),
         (np.zeros(3), {}, r"of shape \(3,\)"),
         (np.zeros((0, 2, 3)), {}, "at least one"),
         (np.zeros((2, 2), np.int64), {}, "is int64; it must be uint8, uint16 or float"),

@@ -15,7 +15,8 @@ import numpy as np
 from ..arrays.elementary import exp, log
 from ..arrays.state import SurfaceInteraction
 from ..arrays.vec import INV_PI, TINY, Bools, Floats, dot, f4
-from ..core.parameter import Parameter, flag, parametrized
+from ..core.errors import flag
+from ..core.parameter import Parameter, parametrized
 from ..textures.base import BaseTexture
 from ..textures.parameter import Color, Scalar, color, index_of, refractive_index, scalar
 from .albedo import dielectric_albedo, facet_cosines, gloss_tables, lookup

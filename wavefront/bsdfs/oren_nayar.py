@@ -8,8 +8,8 @@ import numpy as np
 
 from ..arrays.elementary import arctan2
 from ..arrays.vec import INV_PI, Floats, dot, f4
-from ..core.errors import SceneError
-from ..core.parameter import Parameter, brief, flag, parametrized
+from ..core.errors import SceneError, flag
+from ..core.parameter import Parameter, brief, parametrized
 from ..sampling.warp import cosine_hemisphere_pdf
 from ..textures.base import BaseTexture
 from ..textures.parameter import Color, Scalar, color, scalar

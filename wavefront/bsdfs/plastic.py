@@ -7,8 +7,8 @@ from functools import cache, partial
 import numpy as np
 
 from ..arrays.vec import INV_PI, Doubles, Floats, dot, f4
-from ..core.errors import number
-from ..core.parameter import Parameter, flag, parametrized
+from ..core.errors import flag, number
+from ..core.parameter import Parameter, parametrized
 from ..sampling.warp import cosine_hemisphere, cosine_hemisphere_pdf
 from ..textures.base import BaseTexture
 from ..textures.parameter import MAX_INDEX, Color, Scalar, color, index_of, scalar

@@ -10,7 +10,8 @@ import numpy as np
 
 from ..arrays.state import SurfaceInteraction
 from ..arrays.vec import INV_PI, TINY, Bools, Floats, broadcast, dot, f4, luminance
-from ..core.parameter import Parameter, flag, optional, parametrized
+from ..core.errors import flag
+from ..core.parameter import Parameter, optional, parametrized
 from ..sampling.warp import cosine_hemisphere, cosine_hemisphere_pdf
 from ..textures.base import BaseTexture
 from ..textures.parameter import Color, Scalar, color, refractive_index, scalar

@@ -10,8 +10,8 @@ import numpy as np
 from ..arrays.elementary import sin_cos_turns
 from ..arrays.state import SurfaceInteraction
 from ..arrays.vec import Floats, dot, f4
-from ..core.errors import one_of
-from ..core.parameter import Parameter, flag, optional, parametrized
+from ..core.errors import flag, one_of
+from ..core.parameter import Parameter, optional, parametrized
 from ..textures.base import BaseTexture
 from ..textures.parameter import Scalar, scalar
 from .base import JointBsdf

@@ -84,6 +84,10 @@ class Camera(Answers):
     ) -> None:
         self.origin = finite_array("Camera origin", origin, (3,))
         self.rotation = rotation_matrix("Camera rotation", rotation)
+        if not isinstance(projection, Projection):
+            raise SceneError(
+                f"Camera projection is {in_brief(projection)}; wf.Camera.look_at and others make one"
+            )
         self.projection = projection
         self.resolution = image_size(size)
         projection.check(self.resolution)

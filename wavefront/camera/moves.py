@@ -10,10 +10,9 @@ from numpy.typing import ArrayLike
 
 from ..arrays.elementary import arctan2, sin_cos
 from ..arrays.vec import Doubles
-from ..core.errors import SceneError, finite_array, number
-from ..core.plural import plural
+from ..core.errors import SceneError, finite_array, in_brief, iterable, number
 from ..core.suggestions import suggests_keywords
-from .base import Camera, upward
+from .base import Camera, check_camera, upward
 
 
 @suggests_keywords
@@ -42,6 +41,8 @@ def orbit(camera: Camera, center: ArrayLike, degrees: float, up: ArrayLike = "y"
     >>> wf.orbit(camera, (0, 0, 0), 90).origin.round(6) + 0.0
     array([4., 0., 0.])
     """
+    if check_camera("camera", camera) is None:
+        raise SceneError("camera is None; it must be a wf.Camera")
     middle = finite_array("center", center, (3,))
     turn = _rotation(upward("up", up), np.radians(number("degrees", degrees)))
     return _placed(camera, middle + turn @ (camera.origin - middle), turn @ camera.rotation)
@@ -78,8 +79,11 @@ def interpolate_cameras(cameras: Sequence[Camera], n: int) -> list[Camera]:
     >>> path[2].origin
     array([0.5, 0. , 4. ])
     """
-    if len(cameras) < 2 or n < 2:
-        raise SceneError(f"{plural(n, 'camera')} between {len(cameras)}; both numbers must be at least 2")
+    cameras = list(iterable("cameras", cameras, "cameras"))
+    if len(cameras) < 2 or not all(isinstance(camera, Camera) for camera in cameras):
+        raise SceneError(f"cameras is {in_brief(cameras)}; it must be at least 2 of wf.Camera")
+    if not isinstance(n, int | np.integer) or n < 2:
+        raise SceneError(f"n is {in_brief(n)}; it must be a whole number of at least 2")
     places = np.array([camera.origin for camera in cameras])
     # beyond both ends the path goes straight on
     ends = 2 * places[:1] - places[1:2], 2 * places[-1:] - places[-2:-1]

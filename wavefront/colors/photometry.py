@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ..core.errors import SceneError, as_array, number
+from ..core.errors import SceneError, as_array, in_brief, number
 from ..core.suggestions import suggests_keywords
 from .color import rgb
 
@@ -90,6 +90,8 @@ def to_photometric(radiometric: Any, *, efficacy: float = EFFICACY) -> NDArray[n
     values = np.broadcast_to(values, 3) if values.ndim == 0 else values
     if values.ndim < 1 or values.shape[-1] != 3:
         raise SceneError(f"radiometric must have shape (..., 3), got {values.shape}")
+    if values.dtype.kind not in "fiub":
+        raise SceneError(f"radiometric must be numeric, got {in_brief(radiometric)}")
     values = values if values.dtype.kind == "f" else values.astype(np.float64)
     weights = np.multiply(WEIGHTS, _efficacy(efficacy)).astype(values.dtype)
     return np.asarray(values[..., 0] * weights[0] + values[..., 1] * weights[1] + values[..., 2] * weights[2])
@@ -164,12 +166,13 @@ def exposure(
     >>> image = wf.render([wf.Sphere((0, 0, 0), 1), wf.Environment(wf.from_photometric(5000))], size=(8, 8))
     >>> image.save("day.png", exposure=wf.exposure(f_number=8, shutter=1 / 125))
     """
+    speed = number("exposure iso", iso, lambda x: x > 0, "above 0")
     if (ev100 is None) == (f_number is None and shutter is None):
         raise SceneError("exposure needs ev100, or f_number and shutter, and not both")
     if ev100 is None:
-        given = {"f_number": f_number, "shutter": shutter, "iso": iso}
-        n, t, s = (number(f"exposure {k}", v, lambda x: x > 0, "above 0") for k, v in given.items())
-        ev100 = math.log2(n * n / t * 100 / s)
+        given = {"f_number": f_number, "shutter": shutter}
+        n, t = (number(f"exposure {k}", v, lambda x: x > 0, "above 0") for k, v in given.items())
+        ev100 = math.log2(n * n / t * 100 / speed)
     return math.log2(_efficacy(efficacy) / WHITE) - number("exposure ev100", ev100)
 
 

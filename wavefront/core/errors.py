@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 import sys
 import warnings
-from collections.abc import Callable, Collection, Iterable, Iterator
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping
 from contextlib import contextmanager, suppress
 from contextvars import ContextVar
 from typing import Any
@@ -275,6 +275,64 @@ def one_of(name: str, value: Any, choices: Collection[Any]) -> Any:
         listed = ", ".join(map(str, choices))
         raise SceneError(f"{name} is {in_brief(value)}; it must be one of {listed}{hint}")
     return value
+
+
+def text(name: str, value: Any) -> str:
+    """Return `value` if it is a text.
+
+    Raises
+    ------
+    SceneError
+        If it is not.
+    """
+    if not isinstance(value, str):
+        raise SceneError(f"{name} is {in_brief(value)}; it must be text")
+    return value
+
+
+def mapping(name: str, value: Any) -> dict[Any, Any]:
+    """Return a mapping as a dict of its own, an empty one for None.
+
+    Raises
+    ------
+    SceneError
+        If it is something else.
+    """
+    if value is not None and not isinstance(value, Mapping):
+        raise SceneError(f"{name} is {in_brief(value)}; it must be a dict")
+    return dict(value or {})
+
+
+def shape_of(value: Any) -> tuple[int, ...]:
+    """Return the shape of what is to be an array; () of what NumPy makes none of."""
+    try:
+        return np.shape(value)
+    except Exception:  # of rows of several lengths, or whatever an object raises; its check says more
+        return ()
+
+
+@contextmanager
+def called(name: str, inner: str) -> Iterator[None]:
+    """Have errors of the block name an argument as the caller wrote it, in place of `inner`."""
+    try:
+        yield
+    except SceneError as error:
+        message = str(error)
+        said = message.replace(inner, name, 1) if inner in message else f"{name}: {message}"
+        raise type(error)(said) from error
+
+
+def flag(name: str, value: Any) -> bool:
+    """Return `value` as a bool if it is True or False.
+
+    Raises
+    ------
+    SceneError
+        If it is something else, such as "false", which counts as true.
+    """
+    if not isinstance(value, bool | np.bool_):
+        raise SceneError(f"{name} is {in_brief(value)}; it must be True or False")
+    return bool(value)
 
 
 def number(

@@ -93,11 +93,6 @@ def parametrized(cls: C) -> C:
     return cls
 
 
-def flag(name: str, value: Any) -> bool:
-    """Return whether a value is true."""
-    return bool(value)
-
-
 def optional(convert: Callable[[str, Any], Any]) -> Callable[[str, Any], Any]:
     """Return the check of a parameter that may be None."""
     return lambda name, value: None if value is None else convert(name, value)

@@ -20,7 +20,7 @@ from ..codecs.images import read_picture, write_image
 from ..codecs.png_jpeg import Gamma
 from ..codecs.white_balance import WhiteBalance
 from ..colors import EFFICACY, rgb, to_photometric
-from ..core.errors import SceneError, as_array, number, one_of
+from ..core.errors import SceneError, as_array, in_brief, iterable, mapping, number, one_of, shape_of
 from ..core.html import picture_html
 from ..core.suggestions import Answers, did_you_mean, suggests_keywords
 from ..film.aov_names import (
@@ -145,18 +145,40 @@ class Image(Answers):
         measured: Mapping[str, NDArray[np.float32]] | None = None,
     ) -> None:
         self.rgb = _checked_pixels(rgb)
+        if not isinstance(spp, int | np.integer) or isinstance(spp, bool) or spp < 0:
+            raise SceneError(f"Image spp is {in_brief(spp)}; it must be a whole number of at least 0")
         self.spp = spp
-        self.metadata = dict(metadata or {})
-        self.counts = counts
-        self.variance = variance
-        self.standard_error = standard_error
-        self.halves = halves
-        self.layers = dict(layers or {})
-        self.errors = dict(errors or {})
-        self.names = {kind: dict(table) for kind, table in (names or {}).items()}
+        self.metadata = mapping("Image metadata", metadata)
+        self.counts = self._plane("counts", counts)
+        self.variance = self._plane("variance", variance)
+        self.standard_error = self._plane("standard_error", standard_error)
+        self.halves = self._plane("halves", halves)
+        self.layers = self._planes("layers", layers)
+        self.errors = self._planes("errors", errors)
+        tables = mapping("Image names", names)
+        self.names = {kind: mapping(f"Image names[{kind!r}]", table) for kind, table in tables.items()}
+        if not (sums is None or isinstance(sums, PictureSums)):
+            raise SceneError(f"Image sums is {in_brief(sums)}; it must be that of another picture, or None")
         self.sums = sums
-        self.scatter = tuple(scatter)
-        self.measured = dict(measured or {})
+        self.scatter = tuple(iterable("Image scatter", scatter, "the scatter of another picture"))
+        if not all(isinstance(each, Scatter) for each in self.scatter):
+            raise SceneError(f"Image scatter is {in_brief(scatter)}; it must be that of another picture")
+        self.measured = self._planes("measured", measured)
+
+    def _plane(self, name: str, values: Any) -> Any:
+        """Return values of pixels as they were given, if they are an array (H, W, ...), or None."""
+        size = self.rgb.shape[:2]
+        if values is not None and shape_of(values)[:2] != size:
+            height, width = size
+            raise SceneError(
+                f"Image {name} must have shape ({height}, {width}, ...), as rgb has, got {in_brief(values)}"
+            )
+        return values
+
+    def _planes(self, name: str, values: Any) -> dict[str, Any]:
+        """Return arrays (H, W, ...) by name."""
+        found = mapping(f"Image {name}", values)
+        return {key: self._plane(f"{name}[{key!r}]", each) for key, each in found.items()}
 
     @property
     def light_groups(self) -> dict[str, NDArray[np.float32]]:

@@ -90,7 +90,7 @@ def as_scene(
             raise SceneError("cannot render a list that contains itself")
         return _joined(subject, material, progress, smooth, (*within, id(subject)))
     what = "an empty list" if isinstance(subject, list | tuple) and not subject else type(subject).__name__
-    raise SceneError(f"cannot render {what}: give {CAN_BE_RENDERED}")
+    raise SceneError(f"cannot render {what}: scene must be {CAN_BE_RENDERED}")
 
 
 def _with_scalars(

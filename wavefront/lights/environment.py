@@ -15,7 +15,7 @@ from ..arrays.state import SurfaceInteraction
 from ..arrays.vec import INV_FOUR_PI, Doubles, Floats, f4
 from ..codecs.budget import in_memory
 from ..colors import is_color_name, rgb
-from ..core.errors import as_array, one_of, rotation_matrix
+from ..core.errors import as_array, called, one_of, rotation_matrix
 from ..core.parameter import Parameter, Parametrized
 from ..core.suggestions import suggests_keywords
 from ..film.aov_names import DEFAULT_GROUP, group_name
@@ -125,9 +125,10 @@ class Environment(Parametrized, FarLight):
         group: str = DEFAULT_GROUP,
         backdrop: ArrayLike | str | os.PathLike[str] | None = None,
     ) -> None:
-        self.backdrop = (
-            None if backdrop is None else Environment(backdrop, transform=transform, filter=filter, rows=rows)
-        )
+        self.backdrop: Environment | None = None
+        if backdrop is not None:
+            with called("Environment backdrop", "Environment radiance"):
+                self.backdrop = Environment(backdrop, transform=transform, filter=filter, rows=rows)
         self._filter = one_of("filter", filter, ("bilinear", "nearest"))
         self._poles = one_of("rows", rows, ("centers", "poles")) == "poles"
         self._transform = None if transform is None else rotation_matrix("Environment transform", transform)

@@ -9,7 +9,7 @@ import numpy as np
 
 from ..arrays.vec import Doubles
 from ..colors import EFFICACY, to_photometric
-from ..core.errors import SceneError, number
+from ..core.errors import SceneError, in_brief, number
 from ..core.suggestions import suggests_keywords
 from ..shapes import Mesh, Shape, Sphere
 from .base import Light
@@ -81,7 +81,7 @@ def _strength_and_power(source: Any) -> tuple[str, Doubles]:
         kinds = (
             "PointLight, PointLights, IESLight, SpotLight without a picture, Mesh or Sphere of even emission"
         )
-        raise SceneError(f"with_flux takes a {kinds}; got {source!r}")
+        raise SceneError(f"with_flux source must be a {kinds}, got {in_brief(source)}")
     record = source.record(np.zeros(3))
     intensity = record.intensity.astype(np.float64)
     mean = intensity.mean(0)

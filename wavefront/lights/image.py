@@ -16,7 +16,7 @@ from ..arrays.vec import INV_PI, INV_TWO_PI, Doubles, Floats, Ints, f4, luminanc
 from ..codecs.budget import Budget
 from ..codecs.encoding import codes_to_linear
 from ..codecs.images import COLOR_BYTES, read_codes
-from ..core.errors import SceneError, as_array, warn_caller
+from ..core.errors import SceneError, as_array, called, warn_caller
 from ..core.files import check_size
 from ..core.plural import plural
 from ..sampling.discrete import Distribution2D
@@ -80,7 +80,7 @@ class ImageEnvironment(InfiniteLight):
             mean += shares.sum((0, 1))
             weights[rows] = luminance(np.moveaxis(shares, -1, 0))
         if not weights.any():
-            raise SceneError("every pixel of the Environment is black; Environment(0) is darkness")
+            raise SceneError("Environment radiance is black in every pixel; Environment(0) is darkness")
         return cls(
             image=image,
             texels=Distribution2D(weights),
@@ -206,12 +206,13 @@ def environment_pixels(source: Any) -> Floats:
         codes = read_codes(source, budget)
         budget.charge(name, COLOR_BYTES * codes.shape[0] * codes.shape[1])
     else:
-        codes, name = as_array("Environment image", source), "Environment image"
+        codes, name = as_array("Environment radiance", source), "Environment radiance"
     if codes.ndim == 2:
         codes = codes[:, :, None]
     if codes.ndim != 3 or not 1 <= codes.shape[2] <= 4 or codes.dtype.kind not in "uif":
         raise SceneError(f"{name} is {codes.dtype} of shape {codes.shape}; it must be (H, W, 3)")
-    check_size(codes.shape[0], codes.shape[1])
+    with called(name, "image"):
+        check_size(codes.shape[0], codes.shape[1])
     is_coded = codes.dtype in (np.uint8, np.uint16)
     with np.errstate(over="ignore"):  # an overflow is infinite, and is reported below
         pixels = codes_to_linear(codes) if is_coded else codes.astype(f4, copy=False)

@@ -10,7 +10,7 @@ import numpy as np
 from ..arrays.elementary import arccos, exp, log
 from ..arrays.soa import soa
 from ..arrays.vec import Floats, f4
-from ..core.errors import SceneError
+from ..core.errors import SceneError, in_brief
 
 OVERCAST = 16  # number of the traditional overcast sky
 # a, b, c, d, e of types 1 to 15: ISO 15469:2004 (CIE S 011/E:2003), table 1
@@ -91,8 +91,8 @@ def cie_function(type: int) -> SkyFunction:
     SceneError
         If there is no such type.
     """
-    if isinstance(type, bool) or type not in range(1, OVERCAST + 1):
-        raise SceneError(f"Sky type is {type!r}; it must be from 1 to 15, or {OVERCAST}")
+    if isinstance(type, bool) or not isinstance(type, int | np.integer) or type not in range(1, OVERCAST + 1):
+        raise SceneError(f"Sky type is {in_brief(type)}; it must be from 1 to 15, or {OVERCAST}")
     if type == OVERCAST:  # (1 + 2·cos Z)/3
         return SkyFunction(np.array([0, 0, 1, 0, 0, 0, 0, 0, 0], f4).reshape(9, 1, 1), slope=2.0)
     gradation, indicatrix = _OF_TYPES[type - 1]

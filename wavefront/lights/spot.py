@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike
 from ..arrays.elementary import arccos, arcsin, sin_cos, sin_cos_turns
 from ..arrays.soa import soa
 from ..arrays.vec import Doubles, Floats, dot, f4, highest
-from ..core.errors import SceneError, finite_array, number, one_of
+from ..core.errors import SceneError, called, finite_array, number, one_of
 from ..core.parameter import Parameter, optional, parametrized
 from ..film.aov_names import DEFAULT_GROUP, group_name
 from ..textures.image import Texture
@@ -141,7 +141,8 @@ def picture_of(name: str, value: Any) -> Texture | None:
     """Return a picture as a texture of colors; None where there is none."""
     if value is None:
         return None
-    picture = value if isinstance(value, Texture) else Texture(value)
+    with called(name, "Texture source"):
+        picture = value if isinstance(value, Texture) else Texture(value)
     if picture.scalar:
         raise SceneError(f"{name} must be a Texture of colors, got {value!r}")
     check_limits(name, picture, lambda x: x >= 0, "at least 0")

@@ -12,9 +12,9 @@ from ..arrays.vec import f4
 from ..bsdfs import Bsdf
 from ..bsdfs.base import is_bsdf
 from ..colors import EFFICACY
-from ..core.errors import SceneError, number
+from ..core.errors import SceneError, flag, number
 from ..core.html import preview_html
-from ..core.parameter import Parameter, Parametrized, flag, instance_of, optional, parametrized
+from ..core.parameter import Parameter, Parametrized, instance_of, optional, parametrized
 from ..core.suggestions import suggests_keywords
 from ..film.aov_names import DEFAULT_GROUP, group_name
 from ..media import BaseMedium

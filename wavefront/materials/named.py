@@ -7,7 +7,7 @@ from collections.abc import Callable
 from ..bsdfs import Bsdf, Conductor, Dielectric, Diffuse, Mirror, OrenNayar, Principled
 from ..bsdfs.conductor import METALS, SPELLINGS
 from ..colors import is_color_name
-from ..core.errors import SceneError, one_of
+from ..core.errors import SceneError, one_of, text
 from ..textures.parameter import Color
 
 METAL_ROUGHNESS = 0.2
@@ -50,7 +50,7 @@ def named_bsdf(title: str, name: str, color: Color | None) -> tuple[str, Bsdf]:
     SceneError
         If the name, called `title` in the message, is unknown, or the material takes no color.
     """
-    key = " ".join(name.lower().replace("_", " ").replace("-", " ").split())
+    key = " ".join(text(title, name).lower().replace("_", " ").replace("-", " ").split())
     key = SPELLINGS.get(key, key)
     if key not in NAMED_MATERIALS and color is None:
         key, color = _with_color(key)

@@ -12,12 +12,12 @@ from ..bsdfs import Bsdf, Dielectric
 from ..bsdfs.dielectric import dispersed
 from ..bsdfs.openpbr import OpenPBRBsdf
 from ..colors import rgb
-from ..core.errors import SceneError, number, warn_caller
+from ..core.errors import SceneError, called, in_brief, number, warn_caller
 from ..core.suggestions import suggests_keywords
 from ..media import HenyeyGreenstein, Medium
 from ..textures.base import BaseTexture
 from ..textures.normal_map import BaseNormalMap
-from ..textures.parameter import Color, Scalar, color
+from ..textures.parameter import Color, Scalar, color, scalar
 from .material import Material
 
 BESIDE_GLASS = (
@@ -134,14 +134,19 @@ class OpenPBR(Material):
             interior = _interior(
                 transmission_color, depth, transmission_scatter, transmission_scatter_anisotropy
             )
-        if isinstance(subsurface_weight, BaseTexture) or subsurface_weight > 0:
+        below = scalar("OpenPBR subsurface_weight", subsurface_weight)
+        if isinstance(below, BaseTexture) or below > 0:
             warn_caller("OpenPBR: subsurface scattering is approximated by a diffuse surface of its color")
         layers = OpenPBRBsdf(**{key: given[key] for key in OpenPBRBsdf.defaults if key in given})
+        opacity = scalar("OpenPBR geometry_opacity", geometry_opacity)
+        if not isinstance(geometry_normal, BaseNormalMap | None):
+            wanted = "a NormalMap or a BumpMap"
+            raise SceneError(f"OpenPBR geometry_normal must be {wanted}, got {in_brief(geometry_normal)}")
+        rgb("OpenPBR transmission_scatter", transmission_scatter, np.inf)
+        number("OpenPBR transmission_scatter_anisotropy", transmission_scatter_anisotropy)
         super().__init__(
             _dispersive(layers, transmission_dispersion_scale, transmission_dispersion_abbe_number),
-            alpha=geometry_opacity
-            if isinstance(geometry_opacity, BaseTexture) or geometry_opacity != 1
-            else None,
+            alpha=opacity if isinstance(opacity, BaseTexture) or opacity != 1 else None,
             normal_map=geometry_normal,
             emission=_emission(_amount("emission_luminance", emission_luminance), emission_color),
             interior=interior,
@@ -176,11 +181,13 @@ def _dispersive(layers: OpenPBRBsdf, scale: float, abbe: float) -> Bsdf:
 
 
 def _emission(luminance: float, tint: Color) -> Color | None:
+    shade = color("OpenPBR emission_color", tint, np.inf)
     if luminance == 0:
         return None
-    if isinstance(tint, BaseTexture):
-        return Scaled(tint, luminance)
-    return color("OpenPBR emission_color", tint, np.inf) * f4(luminance)
+    if isinstance(shade, BaseTexture):
+        return Scaled(shade, luminance)
+    with called("OpenPBR emission_luminance times emission_color", "radiance"), np.errstate(over="ignore"):
+        return rgb("radiance", shade.astype(np.float64) * luminance)
 
 
 def _interior(passed: Color, depth: float, scatter: ArrayLike, anisotropy: float) -> Medium:

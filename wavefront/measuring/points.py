@@ -45,9 +45,11 @@ def grid_points(
         finite_array(f"grid_points: {name}", value, (3,))
         for name, value in (("corner", corner), ("edge_u", edge_u), ("edge_v", edge_v))
     )
-    both = (counts, counts) if isinstance(counts, int | np.integer) else tuple(counts)
+    both = tuple(counts) if isinstance(counts, list | tuple | np.ndarray) else (counts, counts)
     if len(both) != 2:
-        raise SceneError(f"grid_points: counts is {counts!r}; it must be two whole numbers, or one for both")
+        raise SceneError(
+            f"grid_points: counts is {in_brief(counts)}; it must be two whole numbers, or one for both"
+        )
     many, rows = (whole_number(1, MOST)("grid_points: counts", each) for each in both)
     normal = np.cross(u, v)
     length = np.linalg.norm(normal)

@@ -63,7 +63,12 @@ class Weather:
         self.efficacy = number("Weather efficacy", efficacy, lambda x: x > 0, "above 0 lm/W")
         self.direct_normal = finite_array("direct_normal", direct_normal, (None,))
         shape = self.direct_normal.shape
-        self.diffuse_horizontal = finite_array("diffuse_horizontal", diffuse_horizontal, shape)
+        self.diffuse_horizontal = finite_array("diffuse_horizontal", diffuse_horizontal, (None,))
+        if self.diffuse_horizontal.shape != shape:
+            both = f"{len(self.direct_normal)} and {len(self.diffuse_horizontal)}"
+            raise SceneError(
+                f"direct_normal and diffuse_horizontal have {both} hours; they must have as many"
+            )
         given = finite_array("sun", sun, (*shape, 3))
         for name, values in (
             ("direct_normal", self.direct_normal),

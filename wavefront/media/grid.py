@@ -13,7 +13,7 @@ from ..arrays.elementary import exp
 from ..arrays.soa import soa
 from ..arrays.vec import FLOAT32_MAX, TINY, Bools, Doubles, Floats, Ints, dot, f4, highest, take
 from ..colors.spectrum import blackbody_colors
-from ..core.errors import SceneError, as_array, finite_array, number
+from ..core.errors import SceneError, as_array, finite_array, number, shape_of
 from ..core.parameter import Parameter, optional, parametrized
 from .base import BaseMedium, Flight, GlowWeights, MediumRays, MediumRecord, channel_shares
 from .marching import March, optical_depth
@@ -50,7 +50,7 @@ def _colors_or(convert: Any, high: float = FLOAT32_MAX) -> Any:
     """Return the check of a parameter that is a color, or a grid (z, y, x, 3) of colors."""
 
     def check(name: str, value: Any) -> Any:
-        if np.ndim(value) == 4:
+        if len(shape_of(value)) == 4:
             return _grid(name, value, (3,), high)
         return convert(name, value)
 
@@ -59,7 +59,7 @@ def _colors_or(convert: Any, high: float = FLOAT32_MAX) -> Any:
 
 def grid_transform(name: str, value: Any) -> Doubles:
     """Return the matrix (4, 4) from the unit cube."""
-    if np.shape(value) == (2, 3):
+    if shape_of(value) == (2, 3):
         low, high = finite_array(name, value, (2, 3))
         if not (low < high).all():
             raise SceneError(f"{name} has the corners {low.tolist()} and {high.tolist()}; the first is lower")

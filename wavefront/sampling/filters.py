@@ -13,7 +13,7 @@ from typing import TypeAlias
 import numpy as np
 
 from ..arrays.vec import Floats, f4
-from ..core.errors import number
+from ..core.errors import flag, number
 from ..core.registry import Registry
 from . import warp
 
@@ -39,6 +39,7 @@ class _RadiusFilter:
         """Check the radius."""
         name, limit = f"{type(self).__name__} radius", f"above 0 and at most {MOST_PIXELS} pixels"
         number(name, self.radius, lambda x: 0 < x <= MOST_PIXELS, limit)
+        flag(f"{type(self).__name__} windowed", getattr(self, "windowed", False))
 
 
 @dataclass(frozen=True)

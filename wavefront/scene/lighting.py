@@ -17,9 +17,9 @@ from ..arrays.elementary import sin_cos_turns
 from ..arrays.soa import soa
 from ..arrays.vec import Doubles
 from ..bsdfs import Diffuse, ShadowCatcher
-from ..camera import Camera, upward
+from ..camera import Camera, check_camera, upward
 from ..codecs.image_data import TRANSPARENT
-from ..core.errors import SceneError
+from ..core.errors import SceneError, in_brief, one_of
 from ..core.suggestions import suggests_keywords
 from ..lights import Environment, Light, Sky
 from ..materials import Material
@@ -190,9 +190,8 @@ def studio(preset: str = DEFAULT, *, up: ArrayLike = "y", camera: Camera | None 
     >>> wf.render(scene, spp=1, size=(16, 16)).shape
     (16, 16, 3)
     """
-    if preset not in LIGHTINGS:
-        raise SceneError(f"preset is {preset!r}; it must be one of {', '.join(LIGHTINGS)}")
-    axes = _axes(up, camera)
+    one_of("preset", preset, LIGHTINGS)
+    axes = _axes(up, check_camera("camera", camera))
     if preset == "even":
         return [Environment(1.0)]
     if preset == "daylight":
@@ -219,9 +218,9 @@ def check_lighting(lighting: str | None) -> None:
     SceneError
         If it is not the name of a preset, "auto" or None.
     """
-    if lighting is not None and lighting not in ("auto", *LIGHTINGS):
+    if lighting is not None and not (isinstance(lighting, str) and lighting in ("auto", *LIGHTINGS)):
         known = ", ".join(LIGHTINGS)
-        raise SceneError(f"lighting is {lighting!r}; it must be auto, None or one of {known}")
+        raise SceneError(f"lighting is {in_brief(lighting)}; it must be auto, None or one of {known}")
 
 
 def choose_preset(scene: Scene, lighting: str | None) -> str | None:

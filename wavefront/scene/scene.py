@@ -15,7 +15,7 @@ from ..arrays.elementary import sin_cos
 from ..arrays.vec import Doubles
 from ..camera import Camera, ImageSize, check_camera, field_of_view, image_size, upward
 from ..camera.framing import FILL, Balls, fitting_offset, turned_balls
-from ..core.errors import SceneError, finite_array, in_brief
+from ..core.errors import SceneError, finite_array, in_brief, mapping
 from ..core.plural import plural
 from ..core.suggestions import Answers, did_you_mean, suggests_keywords
 from ..lights import Environment, Light
@@ -108,7 +108,7 @@ class Scene(Answers):
         self.lights = lights
         self.camera = camera
         self.up = up
-        self.settings = dict(settings or {})
+        self.settings = mapping("Scene settings", settings)
         self.medium = medium
         self.losses: tuple[Loss, ...] = ()  # what of its file it does not show as the file says
         self.lights_of_file: list[int] | None = None  # their ids, where it was read from a file

@@ -12,7 +12,7 @@ from ..camera import upward
 from ..codecs.image_data import TRANSPARENT
 from ..colors import rgb
 from ..compile.scene import ROULETTE_AFTER
-from ..core.errors import SceneError, in_brief, number, warn_caller
+from ..core.errors import SceneError, flag, in_brief, number, warn_caller
 from ..core.files import check_target
 from ..core.progress import Progress
 from ..core.registry import Registry
@@ -64,19 +64,12 @@ def auto_or(check: SettingCheck) -> SettingCheck:
     return check_other
 
 
-def check_flag(name: str, value: Any) -> bool:
-    """Check that something is True or False."""
-    if not isinstance(value, bool | np.bool_):
-        raise SceneError(f"{name} is {in_brief(value)}; it must be True or False")
-    return bool(value)
-
-
 def check_ground(name: str, value: Any) -> bool | str:
     """Check that something is True, False or "shadow"."""
     if isinstance(value, str) and value == SHADOW:
         return value
     try:
-        return check_flag(name, value)
+        return flag(name, value)
     except SceneError as error:
         raise SceneError(f"{error}, or {SHADOW!r}") from None
 

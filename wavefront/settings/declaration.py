@@ -16,6 +16,7 @@ from numpy.typing import ArrayLike
 from ..accel.registry import ACCELERATORS, AcceleratorMaker
 from ..camera import Camera, ImageSize, check_camera, field_of_view, image_size
 from ..compile.scene import ROULETTE_AFTER
+from ..core.errors import flag
 from ..core.memory import memory_size
 from ..core.progress import Progress
 from ..core.registry import Registry
@@ -37,7 +38,6 @@ from .checks import (
     auto_or,
     check_background,
     check_checkpoint,
-    check_flag,
     check_ground,
     check_noise,
     check_preset,
@@ -387,7 +387,7 @@ class RenderSettings(TypedDict, total=False):
             'figures. What is learned depends on the scene, the camera and the seed alone. "auto" guides '
             'only where a short tuning run says that it pays; `metadata["guided"]` says what it found.',
             option="path guiding: learn where light comes from, for scenes with much indirect light",
-            check=auto_or(check_flag),
+            check=auto_or(flag),
             identity=True,
         ),
     ]
@@ -400,7 +400,7 @@ class RenderSettings(TypedDict, total=False):
             "light between matte surfaces. The errors of such pixels depend on each other: docs/reuse.md "
             'has figures. "auto" shares paths where a short tuning run says that it pays; with glossy '
             "materials or glass only where light is hard to find: docs/choices.md tells how.",
-            check=auto_or(check_flag),
+            check=auto_or(flag),
             option="share paths among pixels: yes, no, or auto: a tuning run finds whether it pays",
         ),
     ]
@@ -427,7 +427,7 @@ class RenderSettings(TypedDict, total=False):
             "light is found by chance, and that of point, spot and directional lights never. Only for "
             '"full"; docs/caustics.md has figures.',
             option="light tracing: paths from lights, for caustics of smooth glass and mirrors",
-            check=check_flag,
+            check=flag,
             identity=True,
         ),
     ]
@@ -479,7 +479,7 @@ class RenderSettings(TypedDict, total=False):
             False,
             "True makes it an error, not a warning, when workers on other machines may compute other bits: "
             "because of another version of NumPy or of this package, or another processor.",
-            check=check_flag,
+            check=flag,
         ),
     ]
     aovs: Annotated[
@@ -501,7 +501,7 @@ class RenderSettings(TypedDict, total=False):
             'are kept by the AOVs "denoising_albedo" and "denoising_normal", which are added. '
             "`image.noisy` is the picture before.",
             option="remove noise from the picture",
-            check=check_flag,
+            check=flag,
         ),
     ]
     progress: Annotated[

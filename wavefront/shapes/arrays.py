@@ -17,7 +17,7 @@ from .mesh import FLOAT32_MIN
 from .transform import points_by, similarities
 
 
-def _radii(name: str, value: ArrayLike) -> Doubles:
+def checked_radii(name: str, value: ArrayLike) -> Doubles:
     """Return radii (n,), or (1,) for a single number."""
     single = as_array(name, value).ndim == 0
     radii = finite_array(name, value, () if single else (None,)).reshape(-1)
@@ -38,7 +38,7 @@ class PrimitiveArray(ColoredShape, CurvedShape):
         (n,) scene units, or (1,) if all have one.
     """
 
-    radii = Checked(_radii)
+    radii = Checked(checked_radii)
     _points: ClassVar[tuple[str, ...]]  # the arrays of points
 
     def __init__(
@@ -97,7 +97,7 @@ class PrimitiveArray(ColoredShape, CurvedShape):
         """
         count = self.count
         if not count:
-            raise SceneError(f"{self.name}: is empty; it must have at least one primitive")
+            raise SceneError(f"{self.name}: {self._points[0]} is empty; it must have at least one row")
         if len(self.radii) not in (1, count):
             raise SceneError(
                 f"{self.name}: radii must be one number, or one for each of {count}, got {len(self.radii)}"

@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike
 
 from ..arrays.vec import Doubles
 from ..bsdfs import Diffuse
-from ..core.errors import number
+from ..core.errors import number, text
 from ..core.parameter import Parameter
 from ..core.suggestions import Answers, suggests_keywords
 from ..materials import Material, MaterialLike, as_material
@@ -23,6 +23,14 @@ class Checked(Parameter[Any]):
     def __set__(self, instance: Any, value: Any) -> None:
         """Store the converted value in the shape's own namespace."""
         vars(instance)[self._name] = self.convert(f"{instance.name}: {self._name}", value)
+
+
+class Name(Parameter[str]):
+    """The name of a shape, which is a text."""
+
+    def __set__(self, instance: Any, value: Any) -> None:
+        """Store the name in the shape's own namespace."""
+        vars(instance)[self._name] = text(f"{type(instance).__name__} name", value)
 
 
 class Shape(Answers, ABC):
@@ -42,7 +50,7 @@ class Shape(Answers, ABC):
     (True, 'ball')
     """
 
-    name: str
+    name = Name(text)
     framed: bool = True
     _material: Material | None = None  # what was given
 

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..bsdfs import NullSurface
-from ..core.errors import SceneError, finite_array, in_brief, number
+from ..core.errors import SceneError, finite_array, in_brief, number, shape_of
 from ..core.suggestions import suggests_keywords
 from ..materials import Material, MaterialLike
 from ..media import GridMedium
@@ -49,7 +49,7 @@ def Box(
     [[-2.0, 0.0, -2.0], [2.0, 2.0, 2.0]]
     """
     middle = finite_array(f"{name}: center", center, (3,))
-    edges = finite_array(f"{name}: size", size, () if np.ndim(size) == 0 else (3,))
+    edges = finite_array(f"{name}: size", size, () if shape_of(size) == () else (3,))
     if not (edges > 0).all():
         raise SceneError(f"{name}: size is {edges.tolist()}; it must be above 0")
     half = np.broadcast_to(edges / 2, 3)

@@ -12,6 +12,8 @@ from ..materials import MaterialLike
 from ..textures.parameter import Color
 from .mesh import Mesh
 
+MOST_RADIUS = 1e37  # so that float32 can hold the corners
+
 
 @suggests_keywords
 def Disk(
@@ -56,7 +58,9 @@ def Disk(
     axis = finite_array(f"{name}: normal", normal, (3,))
     if not np.linalg.norm(axis) > 0:
         raise SceneError(f"{name}: normal is {axis.tolist()}; it must not be zero")
-    size = number(f"{name}: radius", radius, lambda x: x > 0, "above 0")
+    size = number(
+        f"{name}: radius", radius, lambda x: 0 < x <= MOST_RADIUS, f"above 0 and at most {MOST_RADIUS:g}"
+    )
     n = int(
         number(
             f"{name}: segments",

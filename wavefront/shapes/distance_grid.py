@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ..arrays.vec import FLOAT32_MAX, Doubles, Floats, Ints, f4, length
-from ..core.errors import SceneError, finite_array
+from ..core.errors import SceneError, finite_array, flag
 from ..core.suggestions import suggests_keywords
 from ..materials import MaterialLike
 from ..media.grid import grid_transform
@@ -110,7 +110,7 @@ class SignedDistanceGrid(CurvedShape):
         self.name = name
         self.values = values
         self.transform = transform
-        self.smooth = bool(smooth)
+        self.smooth = flag(f"{name}: smooth", smooth)
         self.material = material
 
     def __repr__(self) -> str:

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ..arrays.vec import Doubles, Ints
-from ..core.errors import SceneError, finite_array, one_of
+from ..core.errors import SceneError, as_array, finite_array, flag, one_of, shape_of
 from ..core.suggestions import suggests_keywords
 from ..materials import MaterialLike
 from .mesh import Mesh
@@ -57,7 +57,9 @@ def HeightField(
     (16, 16, 3)
     """
     one_of(f"{name}: up", up, ("y", "z"))
-    heights = np.asarray(z, np.float64) if np.ndim(z) == 2 else finite_array(f"{name}: z", z, (None, None))
+    heights = (
+        np.asarray(z, np.float64) if len(shape_of(z)) == 2 else finite_array(f"{name}: z", z, (None, None))
+    )
     rows, columns = heights.shape
     if rows < 2 or columns < 2:
         raise SceneError(f"{name}: z has shape {heights.shape}; it must have 2 rows and 2 columns at least")
@@ -78,7 +80,7 @@ def HeightField(
     return Mesh(
         vertices,
         faces,
-        normals=_normals(vertices, faces) if smooth else None,
+        normals=_normals(vertices, faces) if flag(f"{name}: smooth", smooth) else None,
         uvs=np.stack([u.ravel(), v.ravel()], 1),
         colors=None if colors is None else _by_point(name, colors, heights.shape),
         material=material,
@@ -116,7 +118,7 @@ def _normals(vertices: Doubles, faces: Ints) -> Doubles:
 
 def _by_point(name: str, colors: ArrayLike, shape: tuple[int, int]) -> NDArray[np.generic]:
     """Return colors with a row for each point, of the same type."""
-    array = np.asarray(colors)
+    array = as_array(f"{name}: colors", colors)
     if array.ndim != 3 or array.shape[:2] != shape:
         raise SceneError(f"{name}: colors must have shape {(*shape, 3)} or {(*shape, 4)}, got {array.shape}")
     return array.reshape(-1, array.shape[2])

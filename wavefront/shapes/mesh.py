@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..arrays.vec import FLOAT32_MAX, Doubles, Ints, cross, spans
-from ..core.errors import SceneError, as_array, finite_array, warn_caller
+from ..core.errors import SceneError, as_array, finite_array, flag, warn_caller
 from ..core.plural import plural
 from ..core.suggestions import suggests_keywords
 from ..materials import Material, MaterialLike
@@ -182,7 +182,7 @@ class Mesh(ColoredShape):
             self.compute_normals(smooth)
         self.material = material
         self.emission = emission
-        self.two_sided = two_sided
+        self.two_sided = flag(f"{name}: two_sided", two_sided)
 
     def __repr__(self) -> str:
         """Return the name and the size of the mesh."""
@@ -214,9 +214,8 @@ class Mesh(ColoredShape):
         count = len(self.vertices)
         if self.faces.max() >= count or self.faces.min() < 0:
             i, j = np.argwhere((self.faces < 0) | (self.faces >= count))[0]
-            raise SceneError(
-                f"{self.name}: faces[{i}][{j}] is {self.faces[i, j]}; it must be in [0, {count - 1}]"
-            )
+            limit = f"in [0, {count - 1}]" if count else "that of a vertex, and vertices has none"
+            raise SceneError(f"{self.name}: faces[{i}][{j}] is {self.faces[i, j]}; it must be {limit}")
         for name in ("normals", "uvs", "uvs1", "tangents", "colors"):
             values = getattr(self, name)
             if values is not None and len(values) != count:

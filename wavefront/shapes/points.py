@@ -10,9 +10,10 @@ from numpy.typing import ArrayLike
 
 from ..arrays.vec import Doubles
 from ..colors import srgb
-from ..core.errors import SceneError, as_array, finite_array, warn_caller
+from ..core.errors import SceneError, as_array, called, finite_array, warn_caller
 from ..core.suggestions import suggests_keywords
 from ..materials import MaterialLike
+from .arrays import checked_radii
 from .mesh import Mesh, positions
 from .segments import Capsules
 from .spheres import Spheres
@@ -62,11 +63,15 @@ def Points(
     """
     places, given = cloud_arrays(points)
     colors = given if colors is None else colors
-    places = positions(f"{name}: centers", places)
+    places = positions(f"{name}: points", places)
+    if not len(places):
+        raise SceneError(f"{name}: points is empty; it must have at least one row")
     if radius is None:
         radius = usual_radius(places)
         warn_caller(f"{name}: {len(places)} points are shown as spheres of radius {radius:.3g}")
-    return Spheres(places, radius, colors, material=material, name=name, cmap=cmap, clim=clim)
+    radii = checked_radii(f"{name}: radius", radius)
+    with called(f"{name}: radius", f"{name}: radii"):
+        return Spheres(places, radii, colors, material=material, name=name, cmap=cmap, clim=clim)
 
 
 @suggests_keywords
@@ -97,8 +102,10 @@ def Edges(
     """
     starts, ends = _ends_of_mesh(lines) if hasattr(lines, "faces") else _ends_of_lines(name, lines)
     if not len(starts):
-        raise SceneError(f"{name}: has no edges")
-    return Capsules(starts, ends, radius, material=material, name=name)
+        raise SceneError(f"{name}: lines has no edges")
+    radii = checked_radii(f"{name}: radius", radius)
+    with called(f"{name}: radius", f"{name}: radii"):
+        return Capsules(starts, ends, radii, material=material, name=name)
 
 
 def cloud_arrays(points: Any) -> tuple[Any, Any]:

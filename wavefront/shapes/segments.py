@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike
 from ..arrays.elementary import sin_cos_turns
 from ..arrays.frame import Frame
 from ..arrays.vec import Doubles
-from ..core.errors import SceneError
+from ..core.errors import SceneError, flag
 from ..core.plural import plural
 from ..core.suggestions import suggests_keywords
 from ..materials import MaterialLike
@@ -146,7 +146,7 @@ class Cylinders(SegmentArray):
         cmap: Any = None,
         clim: ArrayLike | None = None,
     ) -> None:
-        self.caps = bool(caps)
+        self.caps = flag(f"{name}: caps", caps)
         super().__init__(starts, ends, radii, mapped_colors(name, colors, cmap, clim), material, name)
 
     def _reach(self) -> Doubles:

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from ..arrays.elementary import arccos, sin_cos
 from ..arrays.vec import Bools, Doubles, Floats, Ints, cross, dot, length, normalize
-from ..core.errors import SceneError, in_brief, number
+from ..core.errors import SceneError, in_brief, number, shape_of
 
 AUTO = "auto"
 CREASE = 30.0  # degrees between the normals of two faces above which their edge is sharp, for "auto"
@@ -26,7 +26,7 @@ def check_smooth(name: str, value: Any) -> bool | float | str:
         return bool(value)
     if isinstance(value, str) and value == AUTO:
         return AUTO
-    if isinstance(value, str) or np.ndim(value):
+    if isinstance(value, str) or shape_of(value) or isinstance(value, list):
         raise SceneError(
             f"{name} is {in_brief(value)}; it must be True, False, 'auto', or a crease angle in degrees"
         )

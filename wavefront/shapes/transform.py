@@ -9,7 +9,7 @@ from numpy.typing import ArrayLike
 
 from ..arrays.elementary import sin_cos_turns
 from ..arrays.vec import Doubles, Floats, Ints, cross
-from ..core.errors import SceneError, as_array, finite_array, number, one_of
+from ..core.errors import SceneError, as_array, finite_array, number, one_of, shape_of
 
 Matrix = Doubles  # (4, 4), or several
 
@@ -124,7 +124,7 @@ def rotation(name: str, axis: ArrayLike, degrees: float, about: ArrayLike) -> Ma
 
 def scaling(name: str, factor: ArrayLike) -> Matrix:
     """Return the matrix (4, 4) that multiplies lengths by one factor, or by one for each axis."""
-    factors = finite_array(name, factor, () if np.ndim(factor) == 0 else (3,))
+    factors = finite_array(name, factor, () if shape_of(factor) == () else (3,))
     if not factors.all():
         raise SceneError(f"{name} is {factors.tolist()}; none may be 0")
     return np.diag([*np.broadcast_to(factors, 3), 1.0])

@@ -15,7 +15,7 @@ from ..arrays.vec import Doubles, Floats, Ints, f4, luminance
 from ..codecs.budget import Budget
 from ..codecs.images import read_codes
 from ..colors import srgb_to_linear
-from ..core.errors import SceneError, as_array, finite_array, one_of
+from ..core.errors import SceneError, as_array, called, finite_array, flag, in_brief, one_of
 from ..core.files import MAX_PIXELS, check_size
 from ..core.plural import plural
 from ..core.suggestions import suggests_keywords
@@ -88,7 +88,8 @@ class Texture(BaseTexture):
         uv_set: Literal[0, 1] = 0,
         max_pixels: int = MAX_PIXELS,
     ) -> None:
-        codes, self.name, is_picture = _codes(source, max_pixels)
+        codes, self.name, is_picture = _codes(source, _most(max_pixels))
+        srgb, channel = flag("srgb", srgb), _channel(channel)
         self.size = (codes.shape[1], codes.shape[0])  # (width, height)
         self.channels = self._stride = codes.shape[2]  # of the image
         self.has_alpha = self.channels in (2, 4)
@@ -242,32 +243,46 @@ def _codes(source: Any, max_pixels: int) -> tuple[NDArray[Any], str, bool]:
         codes, name = read_codes(source, Budget(max_pixels)), Path(source).name
         is_picture = not name.endswith(".npy")
     else:
-        codes, name = as_array("image array", source), "array"
-    return _checked(codes, name), name, is_picture
+        codes, name = as_array("Texture source", source), "array"
+        return _checked(codes, "Texture source"), name, False
+    return _checked(codes, f"texture {name!r}"), name, is_picture
 
 
-def _checked(codes: NDArray[Any], name: str) -> NDArray[Any]:
+def _checked(codes: NDArray[Any], what: str) -> NDArray[Any]:
     """Return texels (H, W, C) as uint8, uint16 or float32."""
     if codes.ndim == 2:
         codes = codes[:, :, None]
     if codes.ndim != 3 or not 1 <= codes.shape[2] <= 4 or codes.dtype.kind not in "uifb":
-        raise SceneError(
-            f"texture {name!r} is {codes.dtype} of shape {codes.shape}; it must be (H, W, 1 to 4)"
-        )
-    check_size(codes.shape[0], codes.shape[1], math.inf)  # an array may have any size
+        raise SceneError(f"{what} is {codes.dtype} of shape {codes.shape}; it must be (H, W, 1 to 4)")
+    with called(what, "image"):
+        check_size(codes.shape[0], codes.shape[1], math.inf)  # an array may have any size
     if codes.dtype in (np.uint8, np.uint16):
         return np.ascontiguousarray(codes)
     if codes.dtype.kind in "ui":
-        raise SceneError(f"texture {name!r} is {codes.dtype}; it must be uint8, uint16 or float")
+        raise SceneError(f"{what} is {codes.dtype}; it must be uint8, uint16 or float")
     codes = np.ascontiguousarray(codes, np.float32)
     bad = np.argwhere(~np.isfinite(codes))
     if len(bad):
         row, column, _ = bad[0]
         raise SceneError(
-            f"texture {name!r} has {plural(len(bad), 'value that is', 'values that are')} not finite, "
+            f"{what} has {plural(len(bad), 'value that is', 'values that are')} not finite, "
             f"first: row {row}, column {column}"
         )
     return codes
+
+
+def _most(pixels: Any) -> int:
+    whole = isinstance(pixels, int | np.integer) and not isinstance(pixels, bool)
+    if not whole or pixels < 1:
+        raise SceneError(f"max_pixels is {in_brief(pixels)}; it must be a whole number of at least 1")
+    return int(pixels)
+
+
+def _channel(channel: Any) -> Channel | None:
+    """Return a channel as it was given, if it is of a type that channels have."""
+    if not (channel is None or isinstance(channel, int | str)):
+        raise SceneError(f"channel is {in_brief(channel)}; it must be a whole number, 'luminance' or None")
+    return channel  # type: ignore[return-value]  # `_pick` knows the names
 
 
 def _stored(channel: int, there: int) -> int:
@@ -313,9 +328,9 @@ def _factor(name: str, value: ArrayLike, scalar: bool) -> Floats:
 
 
 def _pair(wrap: Any) -> tuple[str, str]:
-    both = (wrap, wrap) if isinstance(wrap, str) else tuple(wrap)
+    both = wrap if isinstance(wrap, list | tuple) else (wrap, wrap)
     if len(both) != 2:
-        raise SceneError(f"wrap is {wrap!r}; it must be one mode, or one for u and one for v")
+        raise SceneError(f"wrap is {in_brief(wrap)}; it must be one mode, or one for u and one for v")
     u, v = (one_of("wrap", mode, ("repeat", "mirror", "clamp")) for mode in both)
     return u, v
 

@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike
 
 from ..arrays.state import SurfaceInteraction
 from ..arrays.vec import Floats, Ints, cross, dot, f4, highest, normalize
-from ..core.errors import SceneError, number
+from ..core.errors import SceneError, called, number
 from ..core.suggestions import suggests_keywords
 from .image import UV_SETS, Texture
 
@@ -83,7 +83,8 @@ class NormalMap(BaseNormalMap):
 
     @suggests_keywords
     def __init__(self, image: TextureSource, strength: float = 1.0) -> None:
-        self.texture = image if isinstance(image, Texture) else Texture(image, srgb=False)
+        with called("NormalMap image", "Texture source"):
+            self.texture = image if isinstance(image, Texture) else Texture(image, srgb=False)
         self.strength = _limited("NormalMap strength", strength, MAX_STRENGTH)
         if self.texture.scalar or self.texture.channels < 3:
             raise SceneError(f"NormalMap: {self.texture!r} gives numbers; it must give three channels")
@@ -145,9 +146,10 @@ class BumpMap(BaseNormalMap):
 
     @suggests_keywords
     def __init__(self, image: TextureSource, height: float = 1.0) -> None:
-        self.texture = (
-            image if isinstance(image, Texture) else Texture(image, srgb=False, channel="luminance")
-        )
+        with called("BumpMap image", "Texture source"):
+            self.texture = (
+                image if isinstance(image, Texture) else Texture(image, srgb=False, channel="luminance")
+            )
         self.height = _limited("BumpMap height", height, MAX_HEIGHT)
         if not self.texture.scalar:
             raise SceneError(f"BumpMap: {self.texture!r} gives colors; choose one by channel=")

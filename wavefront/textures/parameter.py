@@ -5,6 +5,7 @@ A texture of numbers is used as a gray color, and a texture of colors as a numbe
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from typing import Any, TypeAlias
 
@@ -14,7 +15,7 @@ from numpy.typing import ArrayLike
 from ..arrays.state import SurfaceInteraction
 from ..arrays.vec import Floats, f4, luminance
 from ..colors import rgb
-from ..core.errors import SceneError, exact, number, one_of
+from ..core.errors import SceneError, exact, number, one_of, shape_of
 from .base import BaseTexture
 
 # Largest index of refraction; the least is its inverse: fourth powers stay in the range of float32.
@@ -145,7 +146,7 @@ def index_of(name: str, value: Any) -> Any:
 
 def refractive_indices(name: str, value: Color) -> Any:
     """Return a refractive index as by `refractive_index`, or one for each channel as (3, 1) float32."""
-    if isinstance(value, BaseTexture | str) or np.size(value) != 3:
+    if isinstance(value, BaseTexture | str) or math.prod(shape_of(value)) != 3:
         return refractive_index(name, value)  # type: ignore[arg-type]
     return np.concatenate(
         [refractive_index(f"{name}[{i}]", each) for i, each in enumerate(np.ravel(value).tolist())]

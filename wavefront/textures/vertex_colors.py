@@ -6,7 +6,7 @@ from typing import Any
 
 from ..arrays.state import SurfaceInteraction
 from ..arrays.vec import Floats
-from ..core.errors import SceneError
+from ..core.errors import SceneError, in_brief
 from ..core.suggestions import suggests_keywords
 from .base import BaseTexture
 from .parameter import Color, color, scalar
@@ -39,8 +39,8 @@ class VertexColors(BaseTexture):
 
     @suggests_keywords
     def __init__(self, times: Color = 1.0, channel: int | None = None) -> None:
-        if channel not in (None, 0, 1, 2, 3):
-            raise SceneError(f"VertexColors channel is {channel!r}; it must be from 0 to 3, or None")
+        if not (channel is None or (isinstance(channel, int) and channel in range(4))):
+            raise SceneError(f"VertexColors channel is {in_brief(channel)}; it must be from 0 to 3, or None")
         self.channel = channel
         self.scalar = channel is not None
         factor: Any = times
