@@ -9,8 +9,10 @@ import numpy as np
 
 from ..arrays.elementary import sin_cos_turns
 from ..arrays.vec import Doubles
+from ..shapes import Cylinders, Shape, Sphere
 from .joining import stacked
-from .repair import RawMesh
+from .losses import Losses
+from .repair import RawMesh, build
 
 SIDES, RINGS = 128, 64  # around, and from pole to pole
 Strip = tuple[Doubles, Doubles]  # radius and height (2, k) of points, and their normals (2, k)
@@ -71,3 +73,54 @@ def arc(radius: float, half: float = 0.0) -> Strip:
     sin, cos = sin_cos_turns(turns)
     sides = np.where(np.arange(len(turns)) > RINGS // 2, half, -half)
     return np.stack([radius * cos, radius * sin + sides]), np.stack([cos, sin])
+
+
+def as_meshes(shapes: Sequence[Shape], name: str, losses: Losses) -> list[Shape]:
+    """Return shapes that may be stretched: meshes in place of spheres and cylinders."""
+    out: list[Shape] = []
+    for shape in shapes:
+        raw = None
+        if isinstance(shape, Sphere):
+            raw = _ball(shape)
+        elif isinstance(shape, Cylinders):
+            raw = stacked("", _pipes(shape))
+        if raw is None:
+            out.append(shape)
+            continue
+        raw.name, raw.material, raw.emission = shape.name, shape.material, shape.emission
+        made = build(name, raw, losses)
+        out += [] if made is None else [made]
+    return out
+
+
+def _pipes(shape: Cylinders) -> list[RawMesh]:
+    radii = np.broadcast_to(shape.radii, shape.count).tolist()
+    return [_pipe(*each) for each in zip(shape.starts, shape.ends, radii, strict=True)]
+
+
+def _ball(sphere: Sphere) -> RawMesh:
+    """Return a sphere as a mesh, with its texture coordinates."""
+    turn = np.eye(3) if sphere.transform is None else sphere.transform
+
+    def point(u: Doubles, v: Doubles) -> tuple[Doubles, Doubles]:
+        (sin, cos), (up, level) = sin_cos_turns(u - 0.5), sin_cos_turns(v / 2 - 0.25)
+        normal = np.stack([sin * level, up, cos * level], 1) @ turn.T
+        return normal * sphere.radius + sphere.center, normal
+
+    return over_square("sphere", SIDES, RINGS, point)
+
+
+def _pipe(start: Doubles, end: Doubles, radius: float) -> RawMesh:
+    """Return the side of a cylinder as a mesh."""
+    along = end - start
+    axis = along / np.linalg.norm(along)
+    x = np.cross(axis, np.eye(3)[np.abs(axis).argmin()])
+    x = x / np.linalg.norm(x)
+    y = np.cross(axis, x)
+
+    def point(u: Doubles, v: Doubles) -> tuple[Doubles, Doubles]:
+        sin, cos = sin_cos_turns(u)
+        normal = cos[:, None] * x + sin[:, None] * y
+        return start + v[:, None] * along + radius * normal, normal
+
+    return over_square("cylinder", SIDES, 1, point)

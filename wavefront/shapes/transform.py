@@ -42,6 +42,12 @@ def similarities(name: str, value: ArrayLike) -> tuple[Matrix, Doubles]:
     return matrices, np.sqrt(reduce(np.add, squares) / 3)  # in order, for the same bits on any machine
 
 
+def is_even(matrices: Matrix, most: float) -> bool:
+    """Return whether matrices (n, 4, 4) scale alike in all directions, up to a relative difference."""
+    scales = np.linalg.svd(matrices[:, :3, :3], compute_uv=False)
+    return bool((scales[:, 0] - scales[:, 2] <= most * scales[:, 0]).all())
+
+
 def points_by(matrices: Matrix, points: Doubles) -> Doubles:
     """Return points (k, 3), transformed by each of n matrices (n, 4, 4): (n·k, 3)."""
     return (points @ matrices[:, :3, :3].transpose(0, 2, 1) + matrices[:, None, :3, 3]).reshape(-1, 3)

@@ -80,7 +80,13 @@ def _scene(node: Node, job: Job) -> Scene:
         camera = _meter(*seen[0][:2], job)
     elif seen and not measures:
         check_clipping(seen[0][0], camera, found)
-    scene = Scene(found, lights, camera, settings=settings, medium=medium_around(node, job))
+    scene = Scene(
+        found,
+        lights,
+        camera,
+        settings=settings,
+        medium=medium_around(node, seen[0][0] if seen else None, job),
+    )
     if isinstance(camera, Sensors) and found:
         scene.camera = camera.above(scene.bounds)
     return scene

@@ -134,25 +134,74 @@ def _volume(node: Node, name: str, default: float, job: Job) -> Volume:
     return Volume(coefficient(node, name, default, job).reshape(1, 1, 1, 3), matrix)
 
 
-def interior_of(node: Node, job: Job) -> BaseMedium | None:
-    """Return the medium inside of a shape; None for none."""
-    inside = node.values.get("interior") if job.sees_media else None
-    return job.convert(inside) if isinstance(inside, Node) and inside.kind == "medium" else None
+def interior_of(node: Node, job: Job, hollow: bool) -> BaseMedium | None:
+    """Return the medium inside of a shape; None for none.
 
-
-def medium_around(node: Node, job: Job) -> BaseMedium | None:
-    """Return the medium of a scene that is inside of no shape: outside of one, or around a sensor."""
-    shapes = list(_shapes(node.held("shape")))
-    inside = {id(each.values.get("interior")) for each in shapes}
-    outside = [each.values.get("exterior") for each in shapes]
-    outside += [medium for sensor in node.held("sensor") for medium in sensor.held("medium")]
-    nodes = [each for each in outside if isinstance(each, Node) and each.kind == "medium"]
+    A shape that has a medium outside alone is a hole in it, if it is `hollow`: if light passes its surface.
+    """
     if not job.sees_media:
         return None
-    around = list(dict.fromkeys(each for each in nodes if id(each) not in inside))
-    for another in around[1:]:
-        another.lose("another medium around all shapes")
-    return job.convert(around[0]) if around else None
+    inside, outside = (_medium(node, name) for name in ("interior", "exterior"))
+    if inside is None:
+        return job.once("hole", lambda: Medium(0.0)) if hollow and outside is not None else None
+    return _made(inside, job)
+
+
+def _medium(node: Node, name: str) -> Node | None:
+    value = node.values.get(name)
+    return value if isinstance(value, Node) and value.kind == "medium" else None
+
+
+def _made(node: Node, job: Job) -> BaseMedium | None:
+    """Return a medium; equal ones are one."""
+    made: BaseMedium | None = job.once(("medium", _content(node)), lambda: job.convert(node))
+    return made
+
+
+def _content(value: Any) -> Any:
+    """Return what tells plugins with other parameters apart: neither names nor places."""
+    if isinstance(value, Node):
+        named = value.values.items()
+        parts = [
+            (each.kind if isinstance(each, Node) and name.startswith("_arg") else name, each)
+            for name, each in named
+        ]
+        return value.plugin, tuple(sorted((name, repr(_content(each))) for name, each in parts))
+    value = getattr(value, "matrix", value)
+    return value if isinstance(value, str) else np.asarray(value).tolist()
+
+
+def medium_around(node: Node, sensor: Node | None, job: Job) -> BaseMedium | None:
+    """Return the medium of a scene: that around its sensor, unless this is inside of a shape.
+
+    In a scene without a sensor it is the first one outside of a shape that is inside of none.
+    """
+    if not job.sees_media:
+        return None
+    shapes = list(_shapes(node.held("shape")))
+    filled = [(each, medium) for each in shapes if (medium := _medium(each, "interior")) is not None]
+    inside = [_content(medium) for _, medium in filled]
+    outside = {repr(_content(each)): each for shape in shapes if (each := _medium(shape, "exterior"))}
+    apart = [each for each in outside.values() if _content(each) not in inside]
+    if sensor is None:
+        around, what = (apart[0] if apart else None), "another medium around all shapes"
+    else:
+        around, what = next(iter(sensor.held("medium")), None), "the medium outside, where the sensor is not"
+    own = None if around is None else _content(around)
+    for each in apart:
+        if _content(each) != own:
+            each.lose(what)
+    if around is None or any(_content(medium) == own and _holds(shape, job) for shape, medium in filled):
+        return None
+    return _made(around, job)
+
+
+def _holds(shape: Node, job: Job) -> bool:
+    """Return whether the camera is inside of a shape, as far as its bounds say."""
+    if job.eye is None or shape.plugin in ("shapegroup", "merge"):
+        return False
+    boxes = [each.bounds for each in job.convert(shape)]
+    return any(bool(((job.eye > low) & (job.eye < high)).all()) for low, high in boxes)
 
 
 def _shapes(nodes: Iterable[Node]) -> Iterator[Node]:

@@ -10,22 +10,26 @@ from typing import Any
 import numpy as np
 
 from ...arrays.elementary import sin_cos_turns
-from ...arrays.vec import Doubles
+from ...arrays.vec import Doubles, Ints
 from ...bsdfs import Diffuse, Sides
 from ...core.errors import SceneError, as_array
 from ...materials import Material
 from ...shapes import Cylinders, Group, Shape, SignedDistanceGrid, Sphere
-from ...shapes.transform import Matrix
+from ...shapes.smoothing import corner_angles, facet_normals, same_rows
+from ...shapes.transform import EVEN, Matrix, is_even
 from ...textures.image import Texture
 from ..conversion import textures_in
-from ..joining import stacked
+from ..joining import COLUMNS, stacked
+from ..pbrt.shapes import facing
+from ..pbrt.textures import computed
 from ..placing import moved_raw
-from ..repair import RawMesh, build
+from ..repair import RawMesh, build, with_corners_apart
+from ..surfaces import as_meshes
 from ..volumes import parsed_grid
 from .attributes import with_attribute
 from .bsdfs import is_one_sided
 from .media import interior_of
-from .nodes import Job, Node, plugin, unsupported
+from .nodes import PLUGINS, Job, Node, plugin, unsupported
 from .serialized import read_serialized
 from .textures import upside_down
 from .transforms import frame
@@ -33,6 +37,7 @@ from .transforms import frame
 SIDES = 128  # of round shapes that are meshes
 ROUND = 1e-4  # relative difference of the scales along two axes that is taken for rounding
 POLES = np.array([[0.0, 0, -1], [-1, 0, 0], [0, 1, 0]])  # from the axes of a `Sphere` to those of Mitsuba
+LEAST_OPACITY = 1 / 32  # of a surface that emits, which has all of its light all the same
 SURFACE, PARTS = "to_world flip_normals", "bsdf emitter medium sensor"
 
 
@@ -85,7 +90,7 @@ def _cylinder(node: Node, job: Job) -> list[Shape]:
     around = np.linalg.norm(matrix[:3, :3] @ axes[:, :2], axis=0)
     needs_faces = emission is not None or node.held("sensor") or node.flag("flip_normals")
     even = abs(around[1] - around[0]) <= ROUND * around[0]
-    if even and not needs_faces and not textures_in(material, Texture):
+    if even and not needs_faces and not textures_in(material, Texture) and not _has_grain(material):
         ends = np.stack([start, end]) @ matrix[:3, :3].T + matrix[:3, 3]
         size, name = radius * around[0], node.id or "cylinders"
         return [Cylinders(ends[:1], ends[1:], size, caps=False, material=material, name=name)]
@@ -114,12 +119,14 @@ def _sphere(node: Node, job: Job) -> list[Shape]:
     closed = job.eye is None or bool(np.linalg.norm(job.eye - center) > radius)
     material, emission = _appearance(node, job, closed)
     turn = None
-    if textures_in((material, emission), Texture):
+    textured = bool(textures_in((material, emission), Texture))
+    if textured or _has_grain(material):
         material, emission = _for_spheres(material, emission, job)
         left, _, right = np.linalg.svd(matrix[:3, :3])
         turn = left @ right @ POLES
         if np.linalg.det(turn) < 0:
-            node.lose("the reflection of its textures")
+            if textured:
+                node.lose("the reflection of its textures")
             turn = -turn
     name = node.id or "sphere"
     return [Sphere(center, radius, material=material, emission=emission, transform=turn, name=name)]
@@ -132,7 +139,7 @@ def _file(node: Node, job: Job) -> list[Shape]:
     raw = with_attribute(job.name, replace(raw), node)
     if node.flag("flip_tex_coords", node.plugin == "obj") and raw.uvs is not None:
         raw = replace(raw, uvs=raw.uvs * (1, -1) + (0, 1))
-    return _mesh(node, job, replace(raw, name=path.stem), smooth=True)
+    return _mesh(node, job, replace(raw, name=path.stem), of_file=True)
 
 
 @plugin("serialized", "shape", f"{SURFACE} filename shape_index face_normals", PARTS, note="versions 3 and 4")
@@ -141,7 +148,7 @@ def _serialized(node: Node, job: Job) -> list[Shape]:
     key = (path, node.whole("shape_index", 0))
     data = job.once(path, lambda: job.files.read(path))
     raw = job.once(key, lambda: read_serialized(str(path), data, key[1], job.files))
-    return _mesh(node, job, raw, smooth=True)
+    return _mesh(node, job, raw, of_file=True)
 
 
 @plugin("sdfgrid", "shape", "to_world filename grid normals", PARTS)
@@ -175,29 +182,84 @@ def _instance(node: Node, job: Job) -> list[Shape]:
     group, matrix = job.only(node, "shape"), node.matrix()
     if group.plugin != "shapegroup":
         raise SceneError(f"holds a {group.plugin}; it must be a shapegroup")
-    shapes = Group(job.convert(group))
+    shapes = job.convert(group)
+    if not is_even(matrix[None], EVEN):
+        shapes = job.once((group, "meshes"), lambda: as_meshes(shapes, job.name, job.files.losses))
     job.count_instances(len(shapes))
-    return list(shapes.placed(matrix, name=node.id or None))
+    return list(Group(shapes).placed(matrix, name=node.id or None))
 
 
 unsupported("blender bsplinecurve linearcurve ellipsoids ellipsoidsmesh", "shape")
 
 
-def _mesh(node: Node, job: Job, raw: RawMesh, smooth: bool = False, closed: bool = False) -> list[Shape]:
-    """Return a mesh where to_world places it; without normals it is smooth if it is to be."""
+def _mesh(node: Node, job: Job, raw: RawMesh, of_file: bool = False, closed: bool = False) -> list[Shape]:
+    """Return a mesh where to_world places it; that of a file has normals, unless face_normals is set."""
     with np.errstate(over="ignore", invalid="ignore"):
-        raw = moved_raw(raw, node.matrix())
-    if "face_normals" in node.values and node.flag("face_normals"):
-        raw, smooth = replace(raw, normals=None), False
+        raw = _of_file(node, raw) if of_file else moved_raw(raw, node.matrix())
     if node.flag("flip_normals"):
         normals = None if raw.normals is None else -raw.normals
         raw = replace(raw, faces=raw.faces[:, ::-1], normals=normals)
     job.count(raw.faces)
     material, emission = _appearance(node, job, closed)
+    if raw.uvs is None and {"uv", "tangent_frame"} & _reads((material, emission)):
+        raw = _with_coordinates(raw)
     name = node.id or raw.name
-    raw = replace(raw, name=name, material=material, emission=emission, smooth=smooth, tangents=None)
+    raw = replace(raw, name=name, material=material, emission=emission)
     mesh = build(job.name, raw, job.files.losses)
     return [] if mesh is None else [mesh]
+
+
+def _of_file(node: Node, raw: RawMesh) -> RawMesh:
+    """Return a mesh of a file where to_world places it.
+
+    Its front is where its normals point, and else where its faces do: then a reflection turns it.
+    """
+    if node.flag("face_normals"):
+        raw = replace(raw, normals=None)
+    moved = replace(moved_raw(raw, node.matrix()), tangents=None)
+    if moved.normals is not None:
+        return facing(moved, reverse=False)
+    moved.faces = raw.faces
+    if not node.flag("face_normals"):
+        moved.normals = angle_normals(moved.vertices, moved.faces)
+    return moved
+
+
+def angle_normals(vertices: Doubles, faces: Ints) -> Doubles:
+    """Return normals (n, 3): sums of those of the faces at each vertex, weighted by their angles there.
+
+    Vertices of one place, as on seams of texture coordinates, have normals of their own, as in Mitsuba.
+    Source: G. Thürmer and C. Wüthrich 1998, "Computing Vertex Normals from Polygonal Facets".
+    """
+    there = ((faces >= 0) & (faces < len(vertices))).all(1)
+    corners = faces[there].ravel()
+    flat, angles = facet_normals(vertices, faces[there]), corner_angles(vertices[faces[there]]).ravel()
+    sums = [np.bincount(corners, np.repeat(row, 3) * angles, len(vertices)) for row in flat]
+    return np.nan_to_num(np.stack(sums, 1))  # of vertices that are not finite; their faces are left out
+
+
+def _with_coordinates(raw: RawMesh) -> RawMesh:
+    """Return a mesh with the coordinates and the tangents that Mitsuba gives one without uv."""
+    corners = raw.vertices[np.clip(raw.faces, 0, len(raw.vertices) - 1)]
+    flat = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    flat[~(np.abs(flat).max(1) > 0)] = (0, 0, 1)  # of faces without an area, which are left out
+    apart = with_corners_apart(raw)
+    if apart.normals is None:
+        apart.normals = np.repeat(flat, 3, 0)
+    along = np.array([frame(axis)[:, 0] for axis in flat])
+    apart.tangents = np.hstack([np.repeat(along, 3, 0), np.ones((len(apart.vertices), 1))])
+    apart.uvs = np.tile([[0.0, 0], [1, 0], [0, 1]], (len(flat), 1))
+    return apart
+
+
+def _reads(thing: Any) -> set[str]:
+    """Return the fields of surfaces that the textures of something read."""
+    return {name for each in textures_in(thing) for name in each.reads}
+
+
+def _has_grain(material: Material) -> bool:
+    """Return whether a material scatters along its tangents otherwise than across them."""
+    return "tangent_frame" in _reads(material)
 
 
 def _appearance(node: Node, job: Job, closed: bool = False) -> tuple[Material, Any]:
@@ -206,16 +268,19 @@ def _appearance(node: Node, job: Job, closed: bool = False) -> tuple[Material, A
     for extra in (*bsdfs[1:], *emitters[1:]):
         node.lose(f"a second {extra.kind}")
     emission = None
-    if emitters:
-        if emitters[0].plugin != "area":
-            raise SceneError(f"has the emitter {emitters[0].plugin!r}; it must be an area light")
+    if emitters and PLUGINS[emitters[0].plugin].convert is not None and emitters[0].plugin != "area":
+        node.lose(f"the emitter {emitters[0].plugin!r}, which is no area light")
+    elif emitters:
         emission = job.convert(emitters[0])
     if not bsdfs:
-        material = job.made.setdefault(emission is None, Material(Diffuse(0.5 if emission is None else 0)))
-        one_sided = emission is None
+        material = job.made.setdefault(not emitters, Material(Diffuse(0 if emitters else 0.5)))
+        one_sided = not emitters
     else:
         material, one_sided = job.convert(bsdfs[0]), is_one_sided(bsdfs[0])
-    interior = interior_of(node, job)
+    interior = interior_of(node, job, hollow=material.alpha is not None)
+    if emission is not None and material.alpha is not None:
+        alpha, emission = _shining(material.alpha, emission)
+        material = job.changed(material, alpha=alpha)
     if interior is not None:
         material = job.changed(material, interior=interior)
     if one_sided and not closed:
@@ -226,11 +291,34 @@ def _appearance(node: Node, job: Job, closed: bool = False) -> tuple[Material, A
     return material, emission
 
 
+def _shining(alpha: Any, emission: Any) -> tuple[Any, Any]:
+    """Return the opacity and the radiance of a surface all of whose light is seen, whatever its opacity."""
+    alpha = computed(_at_least, alpha, LEAST_OPACITY)
+    return alpha, computed(_quotient, emission, alpha, rising=False)
+
+
+def _at_least(alpha: Any, least: Any) -> Any:
+    return np.maximum(alpha, least)
+
+
+def _quotient(a: Any, b: Any) -> Any:
+    return a / b
+
+
 def _one(name: str, raws: list[RawMesh]) -> RawMesh:
     """Return all meshes of a file as one."""
     if not raws:
         raise SceneError(f"{name}: has no faces")
-    return raws[0] if len(raws) == 1 else stacked("", raws)
+    if len(raws) == 1:
+        return raws[0]
+    raw = stacked("", raws)
+    if raw.normals is not None:
+        return raw
+    # what is one vertex of the file is one of the mesh, whatever the materials of its faces
+    number = same_rows(raw.vertices if raw.uvs is None else np.hstack([raw.vertices, raw.uvs]))
+    first = np.unique(number, return_index=True)[1]
+    columns = {each: None if (rows := getattr(raw, each)) is None else rows[first] for each in COLUMNS}
+    return replace(raw, faces=number[raw.faces], **columns)  # type: ignore[arg-type]
 
 
 def _ring(radius: float) -> tuple[Doubles, Doubles]:

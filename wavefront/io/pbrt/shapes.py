@@ -12,7 +12,7 @@ from ...arrays.elementary import arccos, sin_cos_turns
 from ...arrays.vec import Doubles, cross, dot, spans
 from ...core.errors import SceneError
 from ...shapes import Group, Mesh, Shape, Sphere
-from ...shapes.transform import EVEN, Matrix
+from ...shapes.transform import EVEN, Matrix, is_even
 from ...textures.base import BaseTexture
 from ..conversion import placed, textures_in
 from ..placing import in_range, moved_raw
@@ -170,7 +170,7 @@ def place(entity: Entity, job: Job) -> list[Shape]:
 
 def place_object(entities: Sequence[Entity], job: Job, matrices: Matrix) -> list[Shape]:
     """Return the shapes of an object at each of several places, (n, 4, 4)."""
-    even = _is_even(matrices, EVEN)
+    even = is_even(matrices, EVEN)
     shapes: list[Shape] = []
     for entity in entities:
         with placed(entity.label):
@@ -192,17 +192,11 @@ def _shapes(entity: Entity, job: Job, matrix: Matrix, light: Entity | None, even
     return [] if shape is None else [shape]
 
 
-def _is_even(matrices: Matrix, most: float) -> bool:
-    """Return whether matrices (n, 4, 4) scale alike in all directions, up to a relative difference."""
-    scales = np.linalg.svd(matrices[:, :3, :3], compute_uv=False)
-    return bool((scales[:, 0] - scales[:, 2] <= most * scales[:, 0]).all())
-
-
 def _exact_sphere(entity: Entity, job: Job, matrix: Matrix, light: Entity | None) -> Sphere | None:
     """Return a sphere that needs no mesh: a whole one, without textures, that is not stretched."""
     if entity.type != "sphere" or entity.values.keys() - {"radius", "alpha"} or entity.state.reverse:
         return None
-    if not _is_even(matrix[None], ROUND):
+    if not is_even(matrix[None], ROUND):
         return None
     alpha = _opacity(entity, light, job)
     radius = _radius(entity) * float(np.linalg.svd(matrix[:3, :3], compute_uv=False)[0])
@@ -221,7 +215,7 @@ def _mesh(entity: Entity, job: Job, matrix: Matrix, light: Entity | None) -> Mes
     if not in_range(matrix[None])[0]:
         raise SceneError("is placed by a matrix whose elements are too large")
     with np.errstate(over="ignore", invalid="ignore"):
-        raw = moved_raw(_facing(raw, entity.state.reverse), matrix)
+        raw = moved_raw(facing(raw, entity.state.reverse), matrix)
         area = _area(raw) if light else 0.0
     job.count(raw.faces)
     raw.material = material_of(entity.state, _opacity(entity, light, job), job, entity)
@@ -273,7 +267,7 @@ def _area(raw: RawMesh) -> float:
     return float(np.linalg.norm(np.cross(b - a, c - a), axis=1).sum()) / 2
 
 
-def _facing(raw: RawMesh, reverse: bool) -> RawMesh:
+def facing(raw: RawMesh, reverse: bool) -> RawMesh:
     """Return a mesh whose faces have their fronts where its normals are; `reverse` is ReverseOrientation."""
     faces, normals = raw.faces, raw.normals
     if normals is not None:
