@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from copy import copy
 from dataclasses import dataclass, field
@@ -12,10 +12,12 @@ from typing import Any, Generic, TypeVar
 import numpy as np
 
 from ..arrays.vec import Doubles
-from ..bsdfs import Diffuse, Measured
-from ..core.errors import LimitError, SceneError, finite_array, in_brief, number, one_of
+from ..bsdfs import Diffuse, Measured, NullSurface
+from ..core.errors import LimitError, SceneError, exact, finite_array, in_brief, number, one_of
+from ..lights import Environment, Light, Sky
 from ..materials import Material
 from ..media import Isotropic
+from ..shapes import Shape, Sphere
 from ..textures.base import BaseTexture
 from ..textures.image import StoredImage
 from .losses import Losses
@@ -34,7 +36,9 @@ INSTEAD: dict[str, tuple[Any, str]] = {
     "integrator": ({}, "path tracing in its place"),
     "phase": (Isotropic(), "isotropic in its place"),
     "shape": ((), "left out"),
+    "sampler": ({}, "the default in its place"),
 }
+DIGITS = 3  # to which a number by a hair beyond its limit is rounded
 NUMBERS, VECTORS = ("float", "integer"), ("point3", "vector3", "point", "vector")
 P = TypeVar("P", bound="Part")
 T = TypeVar("T")
@@ -69,6 +73,7 @@ def check_included(place: str, files: SceneFiles, count: int, depth: int) -> Non
 class Part:
     """A part of a scene, such as a shape or a light, with its parameters."""
 
+    kind: str  # what it is: a shape, a light, ...
     lost: Losses  # of the load
     label: str  # where it is, and what, for messages
 
@@ -80,10 +85,35 @@ class Part:
         """Return one value of a parameter of some types, where the format has types."""
         raise NotImplementedError
 
+    def or_default(self, default: T, read: Callable[[], T]) -> T:
+        """Return what `read` returns; where it fails, that is noted, and the default stands in its place.
+
+        Raises
+        ------
+        SceneError
+            If there is no default.
+        """
+        if default is None:
+            return read()
+        with self.lost.part(self.label, done=f"{_brief(default)} in its place"):
+            return read()
+        return default
+
     def number(self, name: str, default: float, holds: Any = None, limit: str = "") -> float:
         """Return a number."""
-        value = self.one(name, default, *NUMBERS)
-        return number(name, value) if holds is None else number(name, value, holds, limit)
+
+        def read() -> float:
+            value = self.one(name, default, *NUMBERS)
+            if holds is None:
+                return number(name, value)
+            found = number(name, value)
+            near = round(found, DIGITS) + 0.0
+            if holds(found) or not holds(near):
+                return number(name, value, holds, limit)
+            self.lost.note(name, self.label, exact(found), f"taken as {exact(near)}")
+            return near
+
+        return self.or_default(default, read)
 
     def whole(self, name: str, default: int, least: int = 0, most: int = 2**31) -> int:
         """Return a whole number."""
@@ -92,23 +122,39 @@ class Part:
 
     def flag(self, name: str, default: bool = False) -> bool:
         """Return True or False."""
-        value = self.one(name, default, "bool")
-        return bool(one_of(name, bool(value) if isinstance(value, np.bool_) else value, (True, False)))
+
+        def read() -> bool:
+            value = self.one(name, default, "bool")
+            return bool(one_of(name, bool(value) if isinstance(value, np.bool_) else value, (True, False)))
+
+        return self.or_default(default, read)
 
     def text(self, name: str, default: str | None = None) -> str:
         """Return a string."""
-        value = self.one(name, default, "string")
-        if not isinstance(value, str):
-            raise SceneError(f"{name} is {in_brief(value)}; it must be a string")
-        return value
+
+        def read() -> str:
+            value = self.one(name, default, "string")
+            if not isinstance(value, str):
+                raise SceneError(f"{name} is {in_brief(value)}; it must be a string")
+            return value
+
+        return read() if default is None else self.or_default(default, read)
 
     def choice(self, name: str, default: str, choices: tuple[str, ...]) -> str:
         """Return one of some strings."""
-        return str(one_of(name, self.text(name, default), choices))
+        return self.or_default(default, lambda: str(one_of(name, self.text(name, default), choices)))
 
     def vector(self, name: str, default: Any) -> Doubles:
         """Return a point or vector, (3,)."""
-        return finite_array(name, self.one(name, default, *VECTORS), (3,))
+        read = lambda: finite_array(name, self.one(name, default, *VECTORS), (3,))  # noqa: E731
+        return read() if default is None else self.or_default(np.asarray(default, np.float64), read)
+
+
+def _brief(value: Any) -> str:
+    """Return what a message says of a default."""
+    if np.shape(value) == (4, 4):
+        return "no transform"
+    return str(np.asarray(value).tolist()) if np.ndim(value) else repr(value) if value != "" else "nothing"
 
 
 @dataclass
@@ -123,6 +169,7 @@ class Conversion(Generic[P]):
     making: list[P] = field(default_factory=list)  # what refers to what is converted now
     triangles: int = 0
     instances: int = 0
+    instead: dict[str, tuple[Any, str]] = field(default_factory=lambda: dict(INSTEAD))
 
     def convert(self, part: P) -> Any:
         """Return what becomes of a part; the same object for the same part."""
@@ -131,19 +178,29 @@ class Conversion(Generic[P]):
                 raise SceneError(f"{part.label}: refers to itself")
             self.making.append(part)
             try:
-                with placed(part.label, self.name):
-                    self.made[part] = self.converted(part)
+                self.made[part] = self._sound(part)
             finally:
                 self.making.pop()
         return self.made[part]
+
+    def _sound(self, part: P) -> Any:
+        """Return what becomes of a part; where it is damaged, what stands for it, which is noted."""
+        kind = part.kind.rpartition(" ")[2]
+        made, done = self.instead.get(kind, (None, "left out"))
+        if kind == "scene":
+            with placed(part.label, self.name):
+                return self.converted(part)
+        with self.files.losses.part(part.label, done), placed(part.label, self.name):
+            return self.converted(part)
+        return made
 
     def converted(self, part: P) -> Any:
         """Return what becomes of a part."""
         raise NotImplementedError
 
-    def instead(self, part: P, kind: str) -> Any:
+    def replaced(self, part: P, kind: str) -> Any:
         """Return what stands for a part that is not supported, which is noted."""
-        made, what = INSTEAD.get(kind, (None, "left out"))
+        made, what = self.instead.get(kind, (None, "left out"))
         part.lose(what)
         return made
 
@@ -196,6 +253,21 @@ class Conversion(Generic[P]):
         most = self.files.limits.instances
         if self.instances > most:
             raise LimitError(f"there are more than {most} instances; the limit is LoadLimits.instances")
+
+
+def shown(shapes: list[Shape], lights: Sequence[Light], losses: Losses) -> list[Shape]:
+    """Return the shapes of a scene; one that is not seen where there is nothing but light from far away.
+
+    Raises
+    ------
+    SceneError
+        If there is neither.
+    """
+    if shapes:
+        return shapes
+    if not any(isinstance(each, Environment | Sky) for each in lights):
+        raise losses.nothing("has no shapes")
+    return [Sphere((0, 0, 0), 1, material=Material(NullSurface()), name="nothing")]
 
 
 def textures_in(thing: Any, kind: type[T] = BaseTexture) -> list[T]:  # type: ignore[assignment]

@@ -163,7 +163,9 @@ def _read_mitsuba(files: SceneFiles, data: bytes, options: LoadOptions) -> Conte
 
     name = files.name
     document = Document(files, data, options.parameters)
-    return _contents(convert(name, document.scene, files, document.find, mesh_reader(files)))
+    return _contents(
+        convert(name, document.scene, files, document.find, mesh_reader(files), document.version)
+    )
 
 
 def _read_usd(files: SceneFiles, data: bytes, options: LoadOptions) -> Contents:

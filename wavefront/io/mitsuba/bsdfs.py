@@ -27,14 +27,16 @@ from ...materials import Material
 from ...textures.base import BaseTexture
 from ...textures.image import Texture
 from ...textures.normal_map import BumpMap, NormalMap
+from ..pbrt.textures import computed, product
 from ..spectra import INDICES, METALS
 from .nodes import Job, Node, plugin, unsupported
 from .textures import as_color, bitmap, color, roughness, scalar
 
 LEAST_INDEX = 1e-6
+HALF = "a pane that lets half of the light through"
 MAPPED = "use_shadowing_function flip_invalid_normals"
 # the back is black
-ONE_SIDED = ("diffuse", "conductor", "roughconductor", "plastic", "roughplastic", "measured")
+ONE_SIDED = ("diffuse", "conductor", "roughconductor", "plastic", "roughplastic", "pplastic", "measured")
 
 
 class ShadingFrameMap(NormalMap):
@@ -108,6 +110,17 @@ plugin("measured", "bsdf", "filename", note="spectra become RGB under D65")(
 )
 
 
+@plugin("polarizer circular", "bsdf", "transmittance", harmless="theta polarizing left_handed", note=HALF)
+@plugin("retarder", "bsdf", "transmittance", harmless="theta delta", note="as in scenes without polarization")
+def _filter(node: Node, job: Job) -> Material:
+    """Return a pane that light passes straight: half of it, as light has no polarization here."""
+    passing = color(node, "transmittance", 1.0, job)
+    passing = computed(product, passing, 1.0 if node.plugin == "retarder" else 0.5)
+    if isinstance(passing, BaseTexture) or np.ptp(passing) > 0:
+        return _named(node, ThinDielectric(1.0, transmittance=passing))
+    return Material(Diffuse(0), alpha=1 - float(np.mean(passing)), name=node.id or None)
+
+
 @plugin("blendbsdf", "bsdf", "weight", holds="bsdf texture")
 def _blend(node: Node, job: Job) -> Material:
     parts = node.held("bsdf")
@@ -135,7 +148,7 @@ def _normal(node: Node, job: Job) -> Material:
     return _mapped(node, job, image, ShadingFrameMap, None)
 
 
-unsupported("circular hair measured_polarized polarizer pplastic retarder", "bsdf")
+unsupported("hair measured_polarized", "bsdf")
 
 
 def _inner(node: Node, job: Job) -> Material:
@@ -215,7 +228,13 @@ OTHERS: dict[str, Callable[[Node, Job], dict[str, Any]]] = {
 
 
 def _model(
-    name: str, make: Callable[..., Bsdf], colors: str, numbers: str = "", others: str = "", harmless: str = ""
+    name: str,
+    make: Callable[..., Bsdf],
+    colors: str,
+    numbers: str = "",
+    others: str = "",
+    harmless: str = "",
+    note: str = "",
 ) -> None:
     """Put a BSDF into the table of plugins; words are `ours=theirs:default`, or `name:default`."""
 
@@ -225,13 +244,16 @@ def _model(
 
     def convert(node: Node, job: Job) -> Material:
         found = {ours: color(node, theirs, default, job) for ours, theirs, default in split(colors)}
-        found |= {ours: scalar(node, theirs, default, job) for ours, theirs, default in split(numbers)}
+        found |= {
+            ours: scalar(node, theirs, default, job, "unbounded" if theirs == "diff_trans" else "albedo")
+            for ours, theirs, default in split(numbers)
+        }
         for each in others.split():
             found |= OTHERS[each](node, job) if each in OTHERS else {}
         return _named(node, make(**found))
 
     read = [theirs for _, theirs, _ in split(f"{colors} {numbers}")]
-    plugin(name, "bsdf", f"{' '.join(read)} {others}", harmless=harmless)(convert)
+    plugin(name, "bsdf", f"{' '.join(read)} {others}", harmless=harmless, note=note)(convert)
 
 
 INDEX, FACETS = "int_ior ext_ior", "alpha alpha_u alpha_v distribution"
@@ -249,6 +271,14 @@ _model(
     PLASTIC,
     others=f"nonlinear {INDEX} alpha distribution",
     harmless="sample_visible",
+)
+_model(
+    "pplastic",
+    Plastic,
+    PLASTIC,
+    others=f"{INDEX} alpha distribution",
+    harmless="sample_visible",
+    note="as roughplastic, without polarization",
 )
 _model(
     "principled",

@@ -9,12 +9,13 @@ from typing import Any
 from ...camera import Sensors, SurfaceSensors
 from ...lights import Environment, Sky
 from ...scene import Scene
+from ..conversion import shown
 from ..repair import RawMesh
 from ..sources import SceneFiles
 from . import bsdfs, emitters, shapes, textures  # noqa: F401  they fill the table
 from .media import medium_around
 from .nodes import Graph, Job, Node, plugin
-from .views import check_clipping, meter_on, sees_media
+from .views import DEFAULT_FILM, check_clipping, meter_on, sees_media
 
 
 def convert(
@@ -23,6 +24,7 @@ def convert(
     files: SceneFiles,
     find: Callable[[str], Path],
     read_mesh: Callable[[Path], list[RawMesh]],
+    version: str = "",
 ) -> Scene:
     """Return the scene of a dictionary.
 
@@ -38,6 +40,8 @@ def convert(
         Returns the path of a file that the scene names.
     read_mesh
         Returns the meshes of an obj or ply file.
+    version
+        What is said of the version of its file where something is unknown.
 
     Raises
     ------
@@ -45,7 +49,8 @@ def convert(
         If the scene is malformed.
     """
     job = Job(name, files, find, read_mesh)
-    made: Scene = job.convert(Graph(name, files.losses).build(scene))
+    job.instead["film"] = DEFAULT_FILM, "the default in its place"
+    made: Scene = job.convert(Graph(name, files.losses, version).build(scene))
     return made
 
 
@@ -73,6 +78,7 @@ def _scene(node: Node, job: Job) -> Scene:
     lamps = [part for part in node.held("emitter") if part.plugin != "area"]
     made = [light for part in lamps if (light := job.convert(part)) is not None]
     lights = [light for each in made for light in (each if isinstance(each, list) else [each])]
+    found = shown(found, lights, job.files.losses)
     settings = settings | followed
     if measures or (not hides and any(isinstance(light, Environment | Sky) for light in lights)):
         settings.pop("background", None)  # alpha is 1

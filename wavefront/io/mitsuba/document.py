@@ -11,13 +11,16 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
+from xml.parsers.expat import ExpatError
 
 import numpy as np
 
 from ...codecs.budget import PER_BYTE
-from ...core.errors import SceneError, one_of
+from ...core.errors import LimitError, SceneError, one_of
 from ...core.suggestions import did_you_mean
+from ...shapes.transform import Matrix
 from ..conversion import check_included, placed
+from ..losses import Losses
 from ..sources import SceneFiles
 from ..text_lines import numbers
 from ..xml_checks import MAX_DEPTH, look_through
@@ -41,6 +44,7 @@ ATTRIBUTES = {  # of the elements that are no plugins: those that must be there,
 }
 MOST_LETTERS = 256  # of the name of a parameter $name
 UNNAMED = "_arg_"  # the names of parameters without one begin with this
+OLD_TAGS = {"luminaire": "emitter", "camera": "sensor"}  # before version 0.5
 TO_UV = {"uoffset": (0, 3), "voffset": (1, 3), "uscale": (0, 0), "vscale": (1, 1)}  # before version 2
 
 
@@ -48,6 +52,7 @@ class Element(dict[str, Any]):
     """A dictionary of `mi.load_dict` that knows where it was in a file."""
 
     place: str = ""
+    tag: str = ""  # the name of its element
     unnamed: int = 0  # how many of its parameters have been given a name
 
 
@@ -76,18 +81,21 @@ class Document:
     Attributes
     ----------
     scene
-        The dictionary.
+        The dictionary, without elements that are damaged or unknown, which are noted.
+    version
+        What is said of the version of an old file where something is unknown.
 
     Raises
     ------
     SceneError
-        If the file, or one that it includes, is malformed. The message names file and line.
+        If it is no scene, a limit is passed, or it does not use a parameter. The message names file and line.
     """
 
     def __init__(self, files: SceneFiles, data: bytes, parameters: Mapping[str, Any]) -> None:
         self._files, self._included, self._aliases = files, 0, dict[str, str]()
         self._values = {name: _as_text(value) for name, value in parameters.items()}
         self._unused = set(self._values)
+        self._losses, self.version = files.losses, ""
         self.folders = [Path(files.name).parent]
         self.scene = self._read(Path(files.name), data, 0)
         for name in sorted(self._unused):
@@ -105,13 +113,15 @@ class Document:
         return found
 
     def _read(self, path: Path, data: bytes, depth: int) -> Element:
-        root = parsed(os.fspath(path), data)
-        version = root.attributes.get("version")
-        if version is None:
-            raise SceneError(f"{root.place}: <{root.name}> has no version")
-        if not re.fullmatch(r"\d+\.\d+(\.\d+)?", version.strip()):
-            raise SceneError(f"{root.place}: version is {version!r}; it must be such as 3.0.0")
+        root = parsed(os.fspath(path), data, self._losses)
+        version = root.attributes.get("version", "").strip()
+        if not re.fullmatch(r"\d+\.\d+(\.\d+)?", version):
+            what = f"version is {version!r}; it must be such as 3.0.0" if version else "has no version"
+            self._losses.note(f"<{root.name}> {what}", root.place, done="read as of 3.0.0")
+            version = "3.0.0"
         old = int(version.split(".")[0]) < 2
+        if old and not depth:
+            self.version = f" in Mitsuba 3; the file is of Mitsuba {version}"
         if root.name not in OBJECTS:
             raise SceneError(f"{root.place}: <{root.name}> cannot be the first element")
         return self._object(root, path, depth, old)
@@ -122,34 +132,36 @@ class Document:
         element = _element(tag, type=given.get("type", "scene" if tag.name == "scene" else ""))
         if not element["type"]:
             raise SceneError(f"{tag.place}: <{tag.name}> has no type")
-        unknown = given.keys() - {"type", "id", "name", "version"}
-        if unknown:
-            raise SceneError(f"{tag.place}: <{tag.name}> has the unknown attribute {min(unknown)!r}")
+        self._ignore(tag, given.keys() - {"type", "id", "name", "version"})
         if "id" in given:
             element["id"] = given["id"]
         for child in tag.children:
-            self._add(element, child, path, depth, old)
+            with self._losses.part(child.place):
+                self._add(element, child, path, depth, old)
         return _upgraded(element) if old else element
+
+    def _ignore(self, tag: Tag, unknown: set[str]) -> None:
+        """Note attributes that are unknown."""
+        for each in sorted(unknown):
+            self._losses.note(f"<{tag.name}> has the unknown attribute {each!r}", tag.place, done="left out")
 
     def _add(self, parent: Element, tag: Tag, path: Path, depth: int, old: bool) -> None:
         """Add what a child says to a plugin's dictionary."""
-        name = tag.name.lower() if old else tag.name
+        name = OLD_TAGS.get(tag.name.lower(), tag.name.lower()) if old else tag.name
         if name in OBJECTS and (name != "spectrum" or "type" in tag.attributes):
             child = self._object(tag, path, depth, old)
             _set(parent, self._substituted(tag).get("name", ""), child, tag, old)
             return
         if name not in OTHERS and name != "spectrum":
-            raise SceneError(f"{tag.place}: {_unknown(name)}")
+            raise SceneError(f"{tag.place}: {_unknown(name)}{self.version}")
         given = self._substituted(tag)
         needed, optional = ATTRIBUTES[name]
         for each in needed:
             if each not in given:
                 raise SceneError(f"{tag.place}: <{name}> has no {each}")
-        unknown = given.keys() - {*needed, *optional}
-        if unknown:
-            raise SceneError(f"{tag.place}: <{name}> has the unknown attribute {min(unknown)!r}")
-        if tag.children and name != "transform":
-            raise SceneError(f"{tag.children[0].place}: <{tag.children[0].name}> cannot be inside <{name}>")
+        self._ignore(tag, given.keys() - {*needed, *optional})
+        for inner in tag.children if name != "transform" else ():
+            self._losses.note(f"<{inner.name}> cannot be inside <{name}>", inner.place, done="left out")
         if name == "include":
             self._include(parent, given, tag, path, depth)
         elif name == "alias":
@@ -183,13 +195,21 @@ class Document:
             values = numbers(tag.place, given["name"], text, (1, 3))
             return _element(tag, type="rgb", value=values * (3 // len(values)))
         if name == "transform":
-            return product([(each.name, self._substituted(each), each.place) for each in tag.children])
+            return self._transform(tag)
         if name == "spectrum":
             if ("value" in given) == ("filename" in given):
                 raise SceneError(f"{tag.place}: <spectrum> needs a value or a filename, and not both")
             read = {key: given[key] for key in ("value", "filename") if key in given}
             return _element(tag, type="spectrum", **read)
         return vector(tag.place, given["name"], given, 0.0)
+
+    def _transform(self, tag: Tag) -> Matrix:
+        """Return the matrix of the operations that are sound."""
+        matrix = np.eye(4)
+        for each in tag.children:
+            with self._losses.part(each.place), np.errstate(over="ignore", invalid="ignore"):
+                matrix = product([(each.name, self._substituted(each), each.place)]) @ matrix
+        return matrix
 
     def _include(self, parent: Element, given: dict[str, str], tag: Tag, path: Path, depth: int) -> None:
         """Add the content of another file."""
@@ -248,7 +268,7 @@ class Document:
         raise SceneError(f"{tag.place}: the parameter ${name[0]} has no value{hint}")
 
 
-def parsed(name: str, data: bytes) -> Tag:
+def parsed(name: str, data: bytes, losses: Losses) -> Tag:
     """Return the first element of an XML file, with all that is in it."""
     above: list[Tag] = []
     roots: list[Tag] = []
@@ -260,20 +280,25 @@ def parsed(name: str, data: bytes) -> Tag:
         at = byte
         element = Tag(tag, attributes, f"{name} line {line}")
         if len(above) >= MAX_DEPTH:
-            raise SceneError(f"{element.place}: its elements are nested deeper than {MAX_DEPTH}")
+            raise LimitError(f"{element.place}: its elements are nested deeper than {MAX_DEPTH}")
         (above[-1].children if above else roots).append(element)
         above.append(element)
 
     def end(tag: str, byte: int) -> None:
         above.pop()
 
-    look_through(name, data, begin, end)
+    try:
+        look_through(name, data, begin, end)
+    except SceneError as error:
+        if not isinstance(error.__cause__, ExpatError) or not roots or not roots[0].children:
+            raise
+        losses.note(f"{error}".removeprefix(f"{name}: "), name, done="what follows is left out")
     return roots[0]
 
 
 def _element(tag: Tag, **values: Any) -> Element:
     element = Element(values)
-    element.place = tag.place
+    element.place, element.tag = tag.place, OLD_TAGS.get(tag.name, tag.name)
     return element
 
 

@@ -140,5 +140,6 @@ def _constant(node: Node, name: str, job: Job, default: float = 1.0, use: Use = 
     """Return light of a point or from far away, (3,), or an albedo, which cannot vary."""
     value = color(node, name, default, job, use)
     if isinstance(value, BaseTexture):
-        raise SceneError(f"{name} is a texture; it must be a color")
+        node.lose(f"{name}, a texture; {default:g} in its place")
+        value = default
     return np.asarray(np.broadcast_to(value, 3), np.float64)

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...arrays.vec import Doubles
+from ...core.errors import SceneError
 from ...media import (
     BaseMedium,
     GridMedium,
@@ -42,7 +43,7 @@ def _homogeneous(node: Node, job: Job) -> Medium:
 
 def phase_of(node: Node, job: Job) -> PhaseFunction:
     """Return the phase function that a medium holds; isotropic without one."""
-    found = [job.convert(each) for each in node.held("phase")]
+    found: list[PhaseFunction] = [job.convert(each) for each in node.held("phase")]
     return found[0] if found else Isotropic()
 
 
@@ -128,7 +129,9 @@ def _volume(node: Node, name: str, default: float, job: Job) -> Volume:
     """Return a parameter that is a volume, or a number or a color, which are a volume of one voxel."""
     value = node.get(name, default)
     if isinstance(value, Node) and value.plugin == "gridvolume":
-        found: Volume = job.convert(value)
+        found: Volume | None = job.convert(value)
+        if found is None:
+            raise SceneError(f"{name} is no volume that can be read")
         return found
     matrix = value.matrix() if isinstance(value, Node) and value.kind == "volume" else np.eye(4)
     return Volume(coefficient(node, name, default, job).reshape(1, 1, 1, 3), matrix)
@@ -168,7 +171,7 @@ def _content(value: Any) -> Any:
         ]
         return value.plugin, tuple(sorted((name, repr(_content(each))) for name, each in parts))
     value = getattr(value, "matrix", value)
-    return value if isinstance(value, str) else np.asarray(value).tolist()
+    return repr(value.tolist() if isinstance(value, np.ndarray) else value)
 
 
 def medium_around(node: Node, sensor: Node | None, job: Job) -> BaseMedium | None:

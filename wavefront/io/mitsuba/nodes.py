@@ -12,11 +12,14 @@ from ...arrays.vec import Doubles
 from ...core.errors import LimitError, SceneError, finite_array, in_brief, one_of
 from ...core.suggestions import did_you_mean
 from ...shapes.transform import Matrix
-from ..conversion import Conversion, Part
+from ..conversion import Conversion, Part, placed
 from ..losses import Losses
 from ..placing import in_range
 from ..xml_checks import MAX_DEPTH
 
+COLORS = ("reflectance", "diffuse_reflectance", "base_color", "color", "albedo", "specular_reflectance")
+PATHS = ("max_depth", "rr_depth", "hide_emitters")  # parameters of integrators
+SIZE = ("width", "height", "crop_width", "crop_height", "crop_offset_x", "crop_offset_y", "rfilter")
 MOST_PARTS = 4096  # plugins that a plugin is made of, each counted as often as it is referred to
 
 
@@ -73,7 +76,7 @@ class Node(Part):
     size: int = 1  # plugins in it
 
     @property
-    def kind(self) -> str:
+    def kind(self) -> str:  # type: ignore[override]
         """What it is: a shape, a bsdf, ..."""
         return PLUGINS[self.plugin].kind
 
@@ -93,14 +96,20 @@ class Node(Part):
 
     def choice(self, name: str, default: str, choices: tuple[str, ...]) -> str:
         """Return one of some strings, in small letters."""
-        return str(one_of(name, self.text(name, default).lower(), choices))
+        return self.or_default(default, lambda: str(one_of(name, self.text(name, default).lower(), choices)))
 
     def matrix(self, name: str = "to_world") -> Matrix:
         """Return a transform, (4, 4)."""
+        return self.or_default(np.eye(4), lambda: self._matrix(name))
+
+    def _matrix(self, name: str) -> Matrix:
         value = self.get(name, np.eye(4))
         matrix = finite_array(name, getattr(value, "matrix", value), (4, 4))
         if not np.array_equal(matrix[3], [0, 0, 0, 1]):
-            raise SceneError(f"{name} has the last row {matrix[3].tolist()}; it must be [0, 0, 0, 1]")
+            if matrix[3, :3].any() or not matrix[3, 3] > 0:
+                raise SceneError(f"{name} has the last row {matrix[3].tolist()}; it must be [0, 0, 0, 1]")
+            self.lost.note(f"{name} has the last row", self.label, str(matrix[3].tolist()), "divided by it")
+            matrix = matrix / matrix[3, 3]
         if not in_range(matrix[None])[0]:
             raise SceneError(f"{name} has an element of size {np.abs(matrix).max():g}, which is too large")
         return matrix
@@ -139,7 +148,7 @@ class Job(Conversion[Node]):
         """Return what becomes of a plugin."""
         entry = PLUGINS[node.plugin]
         if entry.convert is None:
-            return self.instead(node, entry.kind)
+            return self.replaced(node, entry.kind)
         self.check(node)
         return entry.convert(node, self)
 
@@ -153,21 +162,24 @@ class Graph:
         What the dictionary is called in messages.
     lost
         As of `Node`.
+    version
+        What is said of the version of its file.
     """
 
-    def __init__(self, name: str, lost: Losses) -> None:
-        self._name, self._lost = name, lost
+    def __init__(self, name: str, lost: Losses, version: str = "") -> None:
+        self._name, self._lost, self._version = name, lost, version
         self._ids: dict[str, Mapping[str, Any]] = {}
         self._nodes: dict[int, Node] = {}
         self._seen: set[int] = set()
+        self._kept: dict[int, tuple[Mapping[str, Any], Any]] = {}  # in place of plugins that are unknown
 
     def build(self, scene: Any) -> Node:
-        """Return the node of a scene.
+        """Return the node of a scene; plugins that are unknown or damaged are replaced or left out.
 
         Raises
         ------
         SceneError
-            If it is no dictionary of a scene, names an unknown plugin, refers to nothing, or contains itself.
+            If it is no dictionary of a scene, or too large.
         """
         if not isinstance(scene, Mapping) or f"{scene.get('type')}" != "scene":
             raise SceneError(f'{self._name}: is {in_brief(scene)}; it must be a dictionary of type "scene"')
@@ -175,51 +187,47 @@ class Graph:
         return self._node(scene, self._name, "", ())
 
     def _register(self, source: Mapping[str, Any], key: str, depth: int) -> None:
-        """Note the ids of all plugins."""
+        """Note the ids of all plugins; of those that are used twice, the first one counts."""
         if depth > MAX_DEPTH:
-            raise SceneError(f"{self._name}: its plugins are nested deeper than {MAX_DEPTH}")
+            raise LimitError(f"{self._name}: its plugins are nested deeper than {MAX_DEPTH}")
         if id(source) in self._seen:
             return
         self._seen.add(id(source))
-        if not all(isinstance(name, str) for name in (*source, source.get("id", ""))):
-            raise SceneError(
-                f"{self._name}: names of parameters, and ids, must be strings: {in_brief(source)}"
-            )
-        if not isinstance(source.get("type"), str):
-            raise SceneError(f"{self._name}: there is no plugin {in_brief(source.get('type'))}, of {key!r}")
         own = source.get("id", key if depth == 1 else "")
-        if source.get("type") != "ref" and own and self._ids.setdefault(own, source) is not source:
+        named = isinstance(own, str) and own and source.get("type") != "ref"
+        if named and self._ids.setdefault(own, source) is not source:
             place = getattr(source, "place", "") or self._name
-            raise SceneError(f"{place}: the id {own!r} is used twice")
+            self._lost.note(f"the id {own!r} is used twice", place, done="the first one counts")
         for name, value in source.items():
             if isinstance(value, Mapping):
-                self._register(value, "" if name.startswith("_arg_") else name, depth + 1)
+                self._register(value, "" if _unnamed(name) else name, depth + 1)
 
     def _node(self, source: Mapping[str, Any], path: str, key: str, above: tuple[int, ...]) -> Node:
         place = getattr(source, "place", "") or path
-        source = self._target(source, place)
+        source = self._known(self._target(source, place), place)
         if id(source) in above:
             raise SceneError(f"{place}: {source.get('id', key)!r} contains itself")
         if id(source) in self._nodes:
             return self._nodes[id(source)]
         if len(above) > MAX_DEPTH:
-            raise SceneError(f"{place}: plugins refer to each other over more than {MAX_DEPTH} levels")
+            raise LimitError(f"{place}: plugins refer to each other over more than {MAX_DEPTH} levels")
         kind: str = source["type"]
-        if kind not in PLUGINS:
-            raise SceneError(f"{place}: there is no plugin {in_brief(kind)}{did_you_mean(kind, PLUGINS)}")
         own = source.get("id", key)
+        own = own if isinstance(own, str) else ""
         label = f"{place}: {kind}" if place != path else f"{path} ({kind})"
         label += f" {own!r}" if own and (place != path or "id" in source) else ""
         node = Node(kind, own, label, {}, self._lost)
         for name, value in source.items():
             if name in ("type", "id"):
                 continue
-            if isinstance(value, Mapping):
-                inner = "" if name.startswith("_arg_") else name
+            if not isinstance(value, Mapping):
+                node.values[str(name)] = value
+                continue
+            with self._lost.part(label), placed(label, self._name):
+                inner = "" if _unnamed(name) else str(name)
                 child = self._node(value, f"{path}, {name}", inner, (*above, id(source)))
                 node.size += child.size
-                value = child
-            node.values[name] = value
+                node.values[str(name)] = child
         if node.size > MOST_PARTS and kind != "scene":
             raise LimitError(
                 f"{label}: stands for {node.size} plugins, as they refer to each other; "
@@ -239,3 +247,53 @@ class Graph:
                 raise SceneError(f"{place}: refers to the id {in_brief(name)}, which there is not{hint}")
             source = self._ids[name]
         raise SceneError(f"{place}: references lead to each other")
+
+    def _known(self, source: Mapping[str, Any], place: str) -> Mapping[str, Any]:
+        """Return a plugin; in place of one that is unknown, what is known of it.
+
+        Raises
+        ------
+        SceneError
+            If that is nothing.
+        """
+        kind, kept = source.get("type"), id(source)
+        if isinstance(kind, str) and kind in PLUGINS:
+            return source
+        if kept not in self._kept:
+            hint = did_you_mean(kind, PLUGINS) if isinstance(kind, str) else ""
+            what = f"there is no plugin {in_brief(kind)}{self._version}{hint}"
+            made = self._substitute(source)
+            if made is None:
+                raise SceneError(f"{place}: {what}")
+            self._lost.note(what, place, done=f"a {made['type']} in its place")
+            self._kept[kept] = made, source
+        return self._kept[kept][0]
+
+    def _substitute(self, source: Mapping[str, Any]) -> Mapping[str, Any] | None:
+        """Return a plugin that keeps what it can of an unknown one."""
+        held: list[Mapping[str, Any]] = [
+            self._ids.get(str(value.get("id")), value) if value.get("type") == "ref" else value
+            for value in source.values()
+            if isinstance(value, Mapping)
+        ]
+        kinds = [each.get("type") for each in held]
+        known = [PLUGINS[kind].kind if isinstance(kind, str) and kind in PLUGINS else "" for kind in kinds]
+        color = next((source[name] for name in COLORS if name in source), None)
+        tag = getattr(source, "tag", "")
+        if tag in ("", "integrator") and "integrator" in known:
+            return held[known.index("integrator")]
+        if tag == "integrator":
+            return {"type": "path"} | {name: source[name] for name in PATHS if name in source}
+        if tag in ("", "bsdf") and "bsdf" in known:
+            return held[known.index("bsdf")]
+        if tag == "bsdf" or (not tag and color is not None):
+            return {"type": "diffuse"} | ({} if color is None else {"reflectance": color})
+        return (
+            {"type": "hdrfilm"} | {name: source[name] for name in SIZE if name in source}
+            if tag == "film"
+            else None
+        )
+
+
+def _unnamed(name: Any) -> bool:
+    return not isinstance(name, str) or name.startswith("_arg_")

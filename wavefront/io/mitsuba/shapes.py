@@ -17,6 +17,7 @@ from ...materials import Material
 from ...shapes import Cylinders, Group, Shape, SignedDistanceGrid, Sphere
 from ...shapes.smoothing import corner_angles, facet_normals, same_rows
 from ...shapes.transform import EVEN, Matrix, is_even
+from ...textures.base import BaseTexture
 from ...textures.image import Texture
 from ..conversion import textures_in
 from ..joining import COLUMNS, stacked
@@ -254,7 +255,8 @@ def _with_coordinates(raw: RawMesh) -> RawMesh:
 
 def _reads(thing: Any) -> set[str]:
     """Return the fields of surfaces that the textures of something read."""
-    return {name for each in textures_in(thing) for name in each.reads}
+    found: list[BaseTexture] = textures_in(thing)
+    return {name for each in found for name in each.reads}
 
 
 def _has_grain(material: Material) -> bool:

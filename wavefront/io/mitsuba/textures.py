@@ -16,10 +16,11 @@ from ...arrays.state import SurfaceInteraction
 from ...arrays.vec import Doubles, Floats, luminance
 from ...colors import srgb_to_linear
 from ...colors.spectrum import blackbody_spectrum, spectrum_rgb, uniform_emission
-from ...core.errors import SceneError, as_array, finite_array, in_brief, number
+from ...core.errors import SceneError, as_array, exact, finite_array, in_brief, number
 from ...textures.base import BaseTexture
 from ...textures.image import Texture
 from ...textures.vertex_colors import VertexColors
+from ..pbrt.textures import clipped
 from ..spectra import pairs_of
 from ..text_lines import numbers
 from .nodes import Job, Node, plugin, unsupported
@@ -61,8 +62,26 @@ class SquareRoot(BaseTexture):
 
 
 def color(node: Node, name: str, default: Any, job: Job, use: Use = "albedo") -> Value:
-    """Return a parameter that is a number, a color or a texture."""
-    return as_color(_given(node, name, default, job), use)
+    """Return a parameter that is a number, a color or a texture, clamped to the range of its use."""
+    return node.or_default(
+        default, lambda: _within(node, name, as_color(_given(node, name, default, job), use), use)
+    )
+
+
+def _within(node: Node, name: str, value: Value, use: Use) -> Value:
+    """Return a value clamped to the range of its use, which is noted."""
+    if use == "unbounded":
+        return value
+    most = 1.0 if use == "albedo" else np.inf
+    if not isinstance(value, BaseTexture):
+        limited = node.lost.within(name, value, 0.0, most, node.label)
+        return limited if np.ndim(value) else float(limited)
+    limits = value.limits()
+    if limits and use == "albedo" and (limits[0] < 0 or limits[1] > most):
+        found = f"{exact(limits[0])} to {exact(limits[1])}"
+        node.lost.note(f"{name}, a texture,", node.label, found, "clamped to 0 to 1")
+        return clipped(value)
+    return value
 
 
 def as_color(made: Any, use: Use) -> Value:
@@ -83,13 +102,18 @@ def _given(node: Node, name: str, default: Any, job: Job) -> Any:
 def scalar(node: Node, name: str, default: float, job: Job, use: Use = "albedo") -> Value:
     """Return a parameter that is a number or a texture of numbers; a color counts by its luminance."""
     value = node.get(name, default)
-    if isinstance(value, Node) and value.plugin == "bitmap":
-        return bitmap(value, job, channel="luminance")
-    if isinstance(value, Node) and value.plugin == "checkerboard":
-        job.check(value)
-        return _board(value, job, channel=0)
+    if isinstance(value, Node) and value.plugin in ("bitmap", "checkerboard"):
+        return node.or_default(default, lambda: _within(node, name, _numbers(value, job), use))
     value = color(node, name, default, job, use)
     return value if isinstance(value, BaseTexture | float | int) else float(luminance(value))
+
+
+def _numbers(node: Node, job: Job) -> Texture:
+    """Return an image or a checkerboard as a texture of numbers."""
+    if node.plugin == "bitmap":
+        return bitmap(node, job, channel="luminance")
+    job.check(node)
+    return _board(node, job, channel=0)
 
 
 def roughness(node: Node, name: str, default: float, job: Job) -> Value:
@@ -97,7 +121,7 @@ def roughness(node: Node, name: str, default: float, job: Job) -> Value:
     alpha = scalar(node, name, default, job)
     if isinstance(alpha, BaseTexture):
         return SquareRoot(alpha)
-    return float(np.sqrt(number(name, alpha, lambda x: 0 <= x <= 1, "in [0, 1]")))
+    return float(np.sqrt(alpha))
 
 
 def listed(node: Node, name: str) -> list[float]:

@@ -20,11 +20,13 @@ Settings = dict[str, Any]
 Crop = tuple[int, int, int, int] | None
 MOST_CHECKED = 1 << 16  # points of a shape that are compared with the planes of a sensor
 USUAL = {"filter": GaussianFilter(2.0, windowed=True)}  # where a film has no filter
+DEFAULT_FILM = ((768, 576), None, USUAL)
 ENDLESS = 2**16  # bounces, where there is no limit
 CLIPPED = "to_world near_clip far_clip"
 NO_CLIPPING = "near_clip and far_clip do not cut; named where they would"
 FIELD_OF_VIEW = "fov fov_axis focal_length"
-SURFACES = ("path", "direct", "ptracer", "prb")  # integrators that see no media
+# integrators that see no media
+SURFACES = ("path", "direct", "ptracer", "prb", "prb_basic", "direct_projective", "prb_projective")
 METER = "measures at one place, whatever the size of its film"
 FILM = "width height crop_width crop_height crop_offset_x crop_offset_y"
 PIXELS = ("rgb", "rgba", "xyz", "xyza", "luminance", "luminance_alpha")
@@ -61,7 +63,7 @@ def _sensor(node: Node, job: Job) -> tuple[Camera, Settings]:
 def _picture(node: Node, job: Job) -> tuple[tuple[int, int], Crop, Settings]:
     """Return the size, the crop and the settings of the picture of a sensor."""
     film = node.held("film")
-    size, crop, settings = job.convert(film[0]) if film else ((768, 576), None, dict(USUAL))
+    size, crop, settings = job.convert(film[0]) if film else DEFAULT_FILM
     for sampler in node.held("sampler"):
         settings = settings | job.convert(sampler)
     return size, crop, settings
@@ -141,6 +143,14 @@ def _sampler(node: Node, job: Job) -> Settings:
     return {"spp": node.whole("sample_count", 4, 1)} if "sample_count" in node.values else {}
 
 
+@plugin(
+    "prb_basic direct_projective prb_projective prbvolpath",
+    "integrator",
+    "max_depth rr_depth hide_emitters",
+    "",
+    "sppc sppi guiding guiding_mc_size guiding_rounds",
+    "path tracing in its place",
+)
 @plugin("path volpath volpathmis ptracer prb", "integrator", "max_depth rr_depth hide_emitters")
 @plugin("direct", "integrator", "hide_emitters", harmless="shading_samples emitter_samples bsdf_samples")
 @plugin("moment aov", "integrator", "", "integrator", "aovs hide_emitters", "that in it counts")
@@ -165,8 +175,7 @@ def sees_media(integrator: Node) -> bool:
     return integrator.plugin not in SURFACES and all(map(sees_media, integrator.held("integrator")))
 
 
-unsupported("depth stokes direct_projective prb_basic prb_projective prbvolpath", "integrator")
-unsupported("emission_reparam volprim_rf_basic", "integrator")
+unsupported("depth stokes emission_reparam volprim_rf_basic", "integrator")
 unsupported("catmullrom lanczos mitchell", "rfilter")
 unsupported("batch distant flat_sensor", "sensor")
 

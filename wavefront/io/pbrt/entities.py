@@ -52,7 +52,7 @@ def unsupported(kind: str, types: str) -> None:
 class Entity(Part):
     """A shape, a material, a light, ... with its parameters."""
 
-    kind: str
+    kind: str  # as "float texture"
     type: str
     place: str  # file and line
     values: dict[str, Parameter]
@@ -178,7 +178,7 @@ class Job(Conversion[Entity]):
             raise SceneError(f"pbrt has no such {key[0]}{did_you_mean(entity.type, known)}")
         convert = TABLE[key]
         if convert is None:
-            return self.instead(entity, key[0])
+            return self.replaced(entity, key[0])
         entity.unread = {name for name, given in entity.values.items() if not given.optional}
         if entity.kind == "shape":
             entity.unread.discard("alpha")  # it is read with the material

@@ -15,7 +15,7 @@ from ...core.errors import SceneError
 from ...sampling.filters import GaussianFilter
 from ...scene import Scene
 from ...shapes.transform import Matrix, rotation, translation
-from ..conversion import placed
+from ..conversion import placed, shown
 from ..mitsuba.transforms import looking
 from ..repair import RawMesh
 from ..sources import SceneFiles
@@ -111,7 +111,7 @@ class Reader:
             found += place_object(self.objects[name], job, np.array(matrices))
         lamps = [light for entity in self.lights if (light := job.convert(entity)) is not None]
         view = None if camera is None else job.convert(camera)
-        return Scene(found, lamps, view, settings=settings, medium=job.around)
+        return Scene(shown(found, lamps, job.files.losses), lamps, view, settings=settings, medium=job.around)
 
     def _entity(self, kind: str, statement: Statement, target: str, type: str, name: str = "") -> Entity:
         given = self.state.defaults.get(target, {}) | statement.parameters
