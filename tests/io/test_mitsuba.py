@@ -8,6 +8,7 @@ import struct
 import warnings
 import zlib
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -20,6 +21,7 @@ from wavefront.colors.spectrum import blackbody_spectrum, spectrum_rgb
 from wavefront.io.losses import Losses
 from wavefront.io.mitsuba import convert as _  # noqa: F401  fills the table
 from wavefront.io.mitsuba.nodes import PLUGINS, Node
+from wavefront.io.mitsuba.transforms import frame
 from wavefront.sampling.filters import FILTERS as FILTERS_HERE
 
 OBJ = "v 0 0 0\nv 1 0 0\nv 0 1 0\nvt 0 0\nvt 1 0\nvt 0 1\nf 1/1 2/2 3/3\n"
@@ -120,6 +122,134 @@ def test_front_sides_and_flip_normals(kind: str) -> None:
 def test_a_reflection_keeps_the_front_side() -> None:
     mesh = shape("rectangle", to_world=np.diag([1, 1, -1, 1.0]))
     assert (normals(mesh)[:, 2] < 0).all()
+
+
+MIRROR = np.diag([-1.0, 1, 1, 1])
+QUAD = "v 0 0 0\nv 2 0 0\nv 2 1 0\nv 0 1 1\nf 1 2 3\nf 1 3 4\n"
+
+
+@pytest.mark.parametrize("form", ["obj", "serialized"])
+@pytest.mark.parametrize("face_normals", [False, True])
+def test_a_reflection_turns_the_faces_of_a_file_without_normals(
+    tmp_path: Path, form: str, face_normals: bool
+) -> None:
+    (tmp_path / "a.obj").write_text(OBJ)
+    data = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0]], "<f4").tobytes() + np.arange(3, dtype="<u4").tobytes()
+    packed = zlib.compress(struct.pack("<I", 0x1000) + b"\0" + struct.pack("<QQ", 3, 1) + data)
+    (tmp_path / "a.serialized").write_bytes(struct.pack("<HH", 0x041C, 4) + packed + struct.pack("<QI", 0, 1))
+    given = {"filename": str(tmp_path / f"a.{form}"), "face_normals": face_normals}
+    mesh = shape(form, to_world=MIRROR, **given)
+    assert (normals(mesh)[:, 2] < 0).all()
+    assert (mesh.normals is None) == face_normals
+    assert mesh.normals is None or (mesh.normals[:, 2] < 0).all()
+    assert (normals(shape(form, to_world=MIRROR, flip_normals=True, **given))[:, 2] > 0).all()
+
+
+@pytest.mark.parametrize("along", [1, -1])
+def test_the_front_of_a_file_with_normals_is_theirs(tmp_path: Path, along: int) -> None:
+    text = f"v 0 0 0\nv 1 0 0\nv 0 1 0\nvn 0 0 {along}\nf 1//1 2//1 3//1\n"
+    (tmp_path / "a.obj").write_text(text)
+    for matrix in (np.eye(4), MIRROR):
+        mesh = shape("obj", filename=str(tmp_path / "a.obj"), to_world=matrix)
+        assert (normals(mesh)[:, 2] * along > 0).all()
+        assert (mesh.normals[:, 2] * along > 0).all()
+
+
+def test_normals_of_files_weigh_by_angle_alone(tmp_path: Path) -> None:
+    """At the first corner 90° and 45°, whatever the areas; vertices apart in texture have their own."""
+    (tmp_path / "a.obj").write_text("v 0 0 0\nv 9 0 0\nv 0 1 0\nv 0 1 1\nf 1 2 3\nf 1 3 4\n")
+    found = shape("obj", filename=str(tmp_path / "a.obj")).normals[0]
+    assert found / found[2] == pytest.approx([0.5, 0, 1])
+    seam = "v 0 0 0\nv 9 0 0\nv 0 1 0\nv 0 1 1\nvt 0 0\nvt 1 1\nf 1/1 2/1 3/1\nf 1/2 3/2 4/2\n"
+    (tmp_path / "b.obj").write_text(seam)
+    mesh = shape("obj", filename=str(tmp_path / "b.obj"))
+    assert sorted(map(tuple, np.abs(np.round(mesh.normals)).tolist())) == [(0, 0, 1)] * 3 + [(1, 0, 0)] * 3
+    parts = seam.replace("f 1/2", "usemtl b\nf 1/2").replace("/2", "/1")
+    (tmp_path / "c.obj").write_text(parts)
+    mesh = shape("obj", filename=str(tmp_path / "c.obj"))
+    assert len(mesh.vertices) == 4
+
+
+def test_grain_runs_around_the_axis_of_a_sphere_and_a_cylinder() -> None:
+    grain = {"type": "roughconductor", "alpha_u": 0.05, "alpha_v": 0.4}
+    ball = shape("sphere", bsdf=grain, to_world=TURN)
+    assert ball.transform[:, 1] @ np.array(TURN)[:3, 2] == pytest.approx(1)  # the pole of a `Sphere` is y
+    assert shape("sphere", bsdf={"type": "roughconductor"}, to_world=TURN).transform is None
+    assert isinstance(shape("cylinder", bsdf=grain), wf.Mesh)
+
+
+def test_meshes_without_texture_coordinates_have_those_of_mitsuba(tmp_path: Path) -> None:
+    """Weights of the second and third corner; grain along the first axis of the frame of the face."""
+    (tmp_path / "a.obj").write_text(QUAD)
+    board = {"type": "diffuse", "reflectance": {"type": "checkerboard"}}
+    mesh = shape("obj", filename=str(tmp_path / "a.obj"), bsdf=board)
+    assert mesh.uvs[mesh.faces].tolist() == [[[0, 0], [1, 0], [0, 1]]] * 2
+    grain = {"type": "roughconductor", "alpha_u": 0.05, "alpha_v": 0.4}
+    for each in (False, True):
+        mesh = shape("obj", filename=str(tmp_path / "a.obj"), bsdf=grain, face_normals=each)
+        along = frame(normals(mesh)[1])[:, 0]
+        np.testing.assert_allclose(mesh.tangents[mesh.faces[1], :3], [along] * 3, atol=1e-12)
+        assert mesh.tangents[mesh.faces[0], :3].tolist() == [[1, 0, 0]] * 3
+    assert shape("obj", filename=str(tmp_path / "a.obj"), bsdf={"type": "diffuse"}).uvs is None
+
+
+def test_all_light_of_a_masked_emitter_is_seen() -> None:
+    lamp = {"emitter": {"type": "area", "radiance": 3.0}, "to_world": np.diag([9.0, 9, 1, 1])}
+    at = np.diag([-1.0, 1, -1, 1])
+    at[2, 3] = 5
+    eye = {"type": "perspective", "to_world": at, "film": {"type": "hdrfilm", "width": 8, "height": 8}}
+    for opacity, mask in ((0.25, "mask"), (1 / 32, "null")):
+        bsdf = {"type": mask} | ({"opacity": opacity, "b": {"type": "diffuse"}} if mask == "mask" else {})
+        made = scene(eye=eye, lamp={"type": "rectangle", "bsdf": bsdf, **lamp}, sky={"type": "constant"})
+        assert float(np.ravel(made.shapes[0].material.opacity.constant)[0]) == pytest.approx(opacity)
+        image = wf.render(made, spp=256, max_bounces=1, progress=False)
+        error = 3 / opacity * np.sqrt(opacity / (256 * 64))
+        assert image.rgb.mean() == pytest.approx(3 + (1 - opacity) + 0.5 * opacity, abs=4 * error)
+    board = {"type": "bitmap", "data": np.array([[[0.5], [1.0]]], np.float32), "raw": True}
+    bsdf = {"type": "mask", "opacity": board, "b": {"type": "diffuse"}}
+    made = scene(lamp={"type": "rectangle", "bsdf": bsdf, **lamp}).shapes[0]
+    at_left = SimpleNamespace(uv=np.array([[0.25], [0.5]], np.float32))
+    assert made.emission.at(at_left).ravel().tolist() == [6, 6, 6]
+
+
+def test_curved_shapes_of_a_group_may_be_stretched() -> None:
+    ball = {"type": "sphere", "center": [0, 1, 0], "radius": 0.5, "bsdf": {"type": "diffuse", "id": "clay"}}
+    pipe = {"type": "cylinder", "p1": [0, 0, 3], "radius": 0.25}
+    group = {"type": "shapegroup", "ball": ball, "pipe": pipe}
+    ref = {"type": "ref", "id": "group"}
+    stretched = {"type": "instance", "to_world": np.diag([1.0, 2, 3, 1]), "group": ref}
+    even = {"type": "instance", "group": ref}
+    made = scene(group=group, one=stretched, two=even, three={**stretched}).shapes
+    assert [type(each).__name__ for each in made[2:4]] == ["Sphere", "Cylinders"]
+    egg, tube = (each.to_mesh() for each in made[:2])
+    np.testing.assert_allclose(egg.bounds, [[-0.5, 1, -1.5], [0.5, 3, 1.5]], atol=1e-3)
+    np.testing.assert_allclose(tube.bounds, [[-0.25, -0.5, 0], [0.25, 0.5, 9]], atol=1e-3)
+    assert (np.einsum("ij,ij->i", normals(egg), egg.vertices[egg.faces].mean(1) - [0, 2, 0]) > 0).all()
+    assert made[0].mesh is made[4].mesh
+
+
+def test_panes_of_polarizers_let_half_of_the_light_through() -> None:
+    assert material("polarizer").alpha == 0.5
+    assert material("circular", transmittance=0.5).alpha == 0.75
+    assert material("retarder").alpha == 0
+    tinted = material("polarizer", transmittance=rgb(1, 0.5, 0)).bsdf
+    assert value(tinted.transmittance) == [0.5, 0.25, 0]
+    made = material("pplastic", diffuse_reflectance=0.3, alpha=0.25).bsdf
+    assert (value(made.reflectance), value(made.roughness)) == (pytest.approx([0.3] * 3), [0.5])
+
+
+def test_values_by_a_hair_are_clamped() -> None:
+    clay = {"type": "diffuse", "reflectance": rgb(1.00016, 0.5, -1e-9)}
+    with pytest.warns(UserWarning, match=r"reflectance is 1\.00016 0\.5 -1e-09; clamped to 1 0\.5 0"):
+        made = scene(False, ball={"type": "sphere", "bsdf": clay}).shapes[0]
+    assert value(made.material.bsdf.reflectance) == [1, 0.5, 0]
+    eye = {"type": "perspective", "fov": 60.0, "film": {"type": "hdrfilm", "width": 8.0000001}}
+    with pytest.warns(UserWarning, match=r"width is 8\.0000001; taken as 8"):
+        assert scene(False, eye=eye).camera.size[0] == 8
+    nearly = np.diag([2.0, 2, 2, 0.9999999])
+    with pytest.warns(UserWarning, match=r"last row is .*0\.9999999.*; divided by it"):
+        ball = scene(False, ball={"type": "sphere", "to_world": nearly}).shapes[0]
+    assert ball.radius == pytest.approx(2, rel=1e-6)
 
 
 def test_texture_coordinates() -> None:
@@ -905,7 +1035,37 @@ def test_the_medium_around_all_shapes() -> None:
     assert made.medium.sigma_s.ravel() == pytest.approx([0.4, 1.2, 0])
     assert scene(ball={"type": "sphere", "interior": inside}).medium is None
     with pytest.warns(UserWarning, match="another medium around all shapes"):
-        scene(False, fog=fog, one=ball, two={"type": "cube", "exterior": {"type": "homogeneous"}})
+        scene(
+            False, fog=fog, one=ball, two={"type": "cube", "exterior": {"type": "homogeneous", "sigma_t": 3}}
+        )
+
+
+def test_the_scene_has_the_medium_of_its_sensor_alone() -> None:
+    """One outside of a shape elsewhere does not fill it; equal media, wherever they stand, are one."""
+    inside, same = {**FOG, "id": "a"}, {**FOG, "id": "b"}
+    box = {"type": "cube", "bsdf": {"type": "null"}, "interior": inside}
+    ball = {"type": "sphere", "radius": 0.3, "exterior": same}
+    at = np.eye(4)
+    at[:3, 3] = 0, 0, 9
+    eye = {"type": "perspective", "to_world": at}
+    made = scene(eye=eye, box=box, ball=ball)
+    assert made.medium is None
+    with pytest.warns(UserWarning, match="the medium outside, where the sensor is not"):
+        assert scene(False, eye=eye, ball=ball).medium is None
+    outside = scene(eye={**eye, "m": same}, box=box, ball=ball)
+    assert outside.medium is outside.shapes[0].material.interior
+    within = {"type": "perspective", "m": {**FOG}}  # at the middle of the box
+    assert scene(eye=within, box=box, ball=ball).medium is None
+    dense = {**box, "interior": {**FOG, "phase": {"type": "rayleigh"}}}
+    first, second = scene(one=box, two=dense).shapes
+    assert first.material.interior is not second.material.interior
+
+
+def test_a_shape_with_a_medium_outside_alone_is_a_hole() -> None:
+    hole = {"type": "sphere", "bsdf": {"type": "null"}, "exterior": FOG}
+    made = scene(box={"type": "cube", "interior": FOG}, hole=hole).shapes[1]
+    assert not made.material.interior.sigma_s.any()
+    assert not made.material.interior.sigma_a.any()
 
 
 @pytest.mark.parametrize("name", ["volpath", "volpathmis", "path", "direct", "ptracer", "prb", "moment"])
@@ -1021,7 +1181,7 @@ def test_one_warning_names_plugin_id_and_parameter() -> None:
         ({"ball": {"type": "sphere", "b": {"type": "conductor", "material": "Xx"}}}, "material is 'Xx'"),
         ({"ball": {"type": "sphere", "b": {"type": "dielectric", "int_ior": "tea"}}}, "int_ior is 'tea'"),
         ({"ball": {"type": "obj", "filename": "none.obj"}}, r"none\.obj"),
-        ({"ball": {"type": "sphere", "e": {"type": "point"}}}, "must be an area light"),
+        ({"ball": {"type": "sphere", "e": {"type": "point"}}}, "which is no area light"),
         ({"s": {"type": "perspective", "fov": 60, "focal_length": "35mm"}}, "give one of them"),
         ({"s": {"type": "perspective", "film": {"type": "hdrfilm", "width": 0}}}, "width is 0"),
         ({"i": {"type": "path", "max_depth": -5}}, "max_depth is -5"),
@@ -1036,9 +1196,15 @@ def test_one_warning_names_plugin_id_and_parameter() -> None:
         ({"ball": {"type": 3}}, "there is no plugin 3"),
     ],
 )
-def test_malformed_scenes_are_refused(parts: Any, message: str) -> None:
+def test_damage_costs_the_damaged_part(parts: Any, message: str) -> None:
     with pytest.raises(wf.SceneError, match=message):
         scene(board={"type": "rectangle"}, **parts)
+    with pytest.warns(UserWarning, match=message) as caught:
+        made = scene(False, board={"type": "rectangle"}, **parts)
+    assert len(caught) == 1
+    assert len(made.shapes[0].faces) == 2
+    if "ball" in parts and parts["ball"]["type"] == "sphere":  # the others are as they are
+        assert isinstance(made.shapes[1], wf.Sphere)
 
 
 def test_a_scene_is_a_dictionary_of_type_scene() -> None:

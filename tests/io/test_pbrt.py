@@ -951,7 +951,7 @@ def test_balls_of_objects_are_exact_unless_they_are_stretched(tmp_path: Path) ->
         ),
         ("", f'Shape "disk" "float size" 2 {BALL}', "line 3: shape 'disk': size"),
         ("", 'Shape "bilinearmesh" "point3 P" [ 0 0 0 1 0 0 0 1 0 1 1 1 ]', "the curvature of its patches"),
-        ("", f'Material "hair" {BALL}', "material 'hair': a gray Diffuse in its place"),
+        ("", f'Material "hair" {BALL}', "material 'hair': a diffuse surface in its place"),
         ("", f'Material "subsurface" {BALL}', "material 'subsurface': light below the surface"),
         (
             "",

@@ -185,14 +185,18 @@ class Conversion(Generic[P]):
 
     def _sound(self, part: P) -> Any:
         """Return what becomes of a part; where it is damaged, what stands for it, which is noted."""
-        kind = part.kind.rpartition(" ")[2]
-        made, done = self.instead.get(kind, (None, "left out"))
-        if kind == "scene":
+        if part.kind == "scene":
             with placed(part.label, self.name):
                 return self.converted(part)
+        make, done = self.stand_in(part)
         with self.files.losses.part(part.label, done), placed(part.label, self.name):
             return self.converted(part)
-        return made
+        return make()
+
+    def stand_in(self, part: P) -> tuple[Callable[[], Any], str]:
+        """Return what makes that which stands for a damaged part, and what is said of it."""
+        made, done = self.instead.get(part.kind.rpartition(" ")[2], (None, "left out"))
+        return lambda: made, done
 
     def converted(self, part: P) -> Any:
         """Return what becomes of a part."""

@@ -48,6 +48,8 @@ class Part:
         else:
             return False
         place = self._place
+        if what.startswith(f"{self._losses.name} "):  # it names its own place
+            place, _, what = what.partition(": ")
         self._losses.note(what, "" if place and what.startswith(place) else place, done=self._done)
         return True
 

@@ -185,10 +185,14 @@ def _mapped(node: Node, job: Job, image: Node, make: Any, channel: Any) -> Mater
 
 def _ior(node: Node, name: str, default: str) -> float:
     """Return an index of refraction, given as a number or as the name of a material."""
-    value = node.get(name, default)
-    if isinstance(value, str):
-        return INDICES[one_of(name, value.lower(), INDICES)]
-    return number(name, value, lambda x: x > 0, "above 0")
+
+    def read() -> float:
+        value = node.get(name, default)
+        if isinstance(value, str):
+            return INDICES[one_of(name, value.lower(), INDICES)]
+        return number(name, value, lambda x: x > 0, "above 0")
+
+    return node.or_default(INDICES[default], read)
 
 
 def _relative_index(node: Node, job: Job) -> dict[str, Any]:

@@ -144,6 +144,13 @@ class Job(Conversion[Node]):
             raise SceneError(f"{node.label} holds no {kind}")
         return held[0]
 
+    def stand_in(self, node: Node) -> tuple[Callable[[], Any], str]:
+        """Return the bsdf that a damaged bsdf holds, or what the kind of a plugin has."""
+        held = node.held("bsdf") if node.kind == "bsdf" else []
+        if held and held[0] not in self.making:
+            return lambda: self.convert(held[0]), "the bsdf in it in its place"
+        return super().stand_in(node)
+
     def converted(self, node: Node) -> Any:
         """Return what becomes of a plugin."""
         entry = PLUGINS[node.plugin]
@@ -194,7 +201,7 @@ class Graph:
             return
         self._seen.add(id(source))
         own = source.get("id", key if depth == 1 else "")
-        named = isinstance(own, str) and own and source.get("type") != "ref"
+        named = isinstance(own, str) and own and f"{source.get('type')}" != "ref"
         if named and self._ids.setdefault(own, source) is not source:
             place = getattr(source, "place", "") or self._name
             self._lost.note(f"the id {own!r} is used twice", place, done="the first one counts")
@@ -239,7 +246,8 @@ class Graph:
     def _target(self, source: Mapping[str, Any], place: str) -> Mapping[str, Any]:
         """Return what a reference leads to; anything else as it is."""
         for _ in range(MAX_DEPTH):
-            if source.get("type") != "ref":
+            kind = source.get("type")
+            if not isinstance(kind, str) or kind != "ref":
                 return source
             name = source.get("id")
             if not isinstance(name, str) or name not in self._ids:
@@ -262,8 +270,11 @@ class Graph:
         if kept not in self._kept:
             hint = did_you_mean(kind, PLUGINS) if isinstance(kind, str) else ""
             what = f"there is no plugin {in_brief(kind)}{self._version}{hint}"
+            self._kept[kept] = {"type": "diffuse"}, source  # where it holds itself
             made = self._substitute(source)
+            made = None if made is None else self._known(made, place)
             if made is None:
+                del self._kept[kept]
                 raise SceneError(f"{place}: {what}")
             self._lost.note(what, place, done=f"a {made['type']} in its place")
             self._kept[kept] = made, source
@@ -272,12 +283,11 @@ class Graph:
     def _substitute(self, source: Mapping[str, Any]) -> Mapping[str, Any] | None:
         """Return a plugin that keeps what it can of an unknown one."""
         held: list[Mapping[str, Any]] = [
-            self._ids.get(str(value.get("id")), value) if value.get("type") == "ref" else value
+            self._ids.get(str(value.get("id")), value) if f"{value.get('type')}" == "ref" else value
             for value in source.values()
             if isinstance(value, Mapping)
         ]
-        kinds = [each.get("type") for each in held]
-        known = [PLUGINS[kind].kind if isinstance(kind, str) and kind in PLUGINS else "" for kind in kinds]
+        known = [_kind(each) for each in held]
         color = next((source[name] for name in COLORS if name in source), None)
         tag = getattr(source, "tag", "")
         if tag in ("", "integrator") and "integrator" in known:
@@ -293,6 +303,12 @@ class Graph:
             if tag == "film"
             else None
         )
+
+
+def _kind(source: Mapping[str, Any]) -> str:
+    """Return the kind of a plugin, of one that is unknown by its element."""
+    kind = source.get("type")
+    return PLUGINS[kind].kind if isinstance(kind, str) and kind in PLUGINS else getattr(source, "tag", "")
 
 
 def _unnamed(name: Any) -> bool:

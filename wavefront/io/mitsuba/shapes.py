@@ -295,7 +295,8 @@ def _appearance(node: Node, job: Job, closed: bool = False) -> tuple[Material, A
 
 def _shining(alpha: Any, emission: Any) -> tuple[Any, Any]:
     """Return the opacity and the radiance of a surface all of whose light is seen, whatever its opacity."""
-    alpha = computed(_at_least, alpha, LEAST_OPACITY)
+    given = alpha if isinstance(alpha, BaseTexture) else float(np.ravel(alpha)[0])
+    alpha = computed(_at_least, given, LEAST_OPACITY)
     return alpha, computed(_quotient, emission, alpha, rising=False)
 
 

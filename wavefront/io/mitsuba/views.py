@@ -219,7 +219,7 @@ def _field_of_view(node: Node, aspect: float) -> float:
     """Return the horizontal field of view in degrees, of a picture `aspect` times as wide as high."""
     if "fov" in node.values:
         if "focal_length" in node.values:
-            raise SceneError("has fov and focal_length; give one of them")
+            node.lose("has fov and focal_length; give one of them; fov counts")
         angle = node.number("fov", 0, lambda x: 0 < x < 180, "above 0 and below 180 degrees")
         axis = node.choice("fov_axis", "x", ("x", "y", "diagonal", "smaller", "larger"))
     else:

@@ -11,7 +11,7 @@ import numpy as np
 from ...arrays.vec import Doubles, luminance
 from ...bsdfs.dielectric import dispersed
 from ...colors.spectrum import blackbody, spectrum_rgb
-from ...core.errors import SceneError, in_brief
+from ...core.errors import SceneError
 from ...core.suggestions import did_you_mean
 from ...shapes.transform import Matrix
 from ..conversion import Conversion, Part
@@ -111,6 +111,9 @@ class Entity(Part):
 
         Light of a spectrum or a black body has the luminance 1, as in pbrt; that of an rgb has its own.
         """
+        return self.or_default(default, lambda: self._spectrum(name, default, job, use))
+
+    def _spectrum(self, name: str, default: Any, job: Job, use: str) -> Any:
         types = ("rgb", "color", "spectrum", "blackbody", "float")
         found = self.get(name, types)
         if found is None:
@@ -118,11 +121,7 @@ class Entity(Part):
         kind = self.values[name].type
         if kind in ("rgb", "color", "float"):
             color = np.array(found[: NUMBERS[kind]])
-            if (color < 0).any() or (use == "albedo" and (color > 1).any()):
-                raise SceneError(
-                    f"{name} is {in_brief(color.tolist())}; it must be "
-                    f"{'in [0, 1]' if use == 'albedo' else 'at least 0'}"
-                )
+            color = self.lost.within(name, color, 0.0, 1.0 if use == "albedo" else np.inf, self.label)
             return float(color[0]) if kind == "float" else color
         if kind == "blackbody":
             color = blackbody(float(found[0]))
@@ -158,6 +157,7 @@ class Job(Conversion[Entity]):
     exposure: float = 1.0  # factor of all light, by the film
     world: Matrix = field(default_factory=lambda: np.eye(4))  # to the space of the scene: may mirror
     around: Any = None  # the medium where the camera stands
+    insides: set[str] = field(default_factory=set)  # names of the media inside of shapes
 
     def refer(self, kind: str, name: str) -> Entity:
         """Return a named entity."""

@@ -155,9 +155,23 @@ def _square(entity: Entity, job: Job) -> Floats:
     """Return the linear colors of an equal-area image, (n, n, 3)."""
     pixels = _pixels(entity, job)
     height, width = pixels.shape[:2]
+    if width == 2 * height:
+        entity.lose("its image, which is not square, is taken as one by longitude and latitude")
+        return _equal_area(pixels)
     if width != height:
         raise SceneError(f"its image has {width} × {height} pixels; it must be square (equal-area)")
     return pixels
+
+
+def _equal_area(pixels: Floats) -> Floats:
+    """Return an equal-area image (n, n, 3) of one by longitude and latitude (n, 2n, 3), as in pbrt-v3."""
+    size = len(pixels)
+    at = (np.arange(size) + 0.5) / size
+    x, y, z = square_to_sphere(*np.meshgrid(at, at))
+    row = arctan2(np.sqrt(x * x + y * y), z) / np.pi * size
+    column = arctan2(y, x) / (2 * np.pi) % 1 * (2 * size)
+    row, column = (np.floor(each).astype(np.intp) for each in (row, column))
+    return pixels[np.minimum(row, size - 1), np.minimum(column, 2 * size - 1)]
 
 
 def square_to_sphere(x: Doubles, y: Doubles) -> Doubles:

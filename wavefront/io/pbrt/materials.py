@@ -203,7 +203,12 @@ def _mix(entity: Entity, job: Job) -> Mix:
 
 
 converts("material", "interface none")(lambda entity, job: Material(NullSurface(), name=entity.name or None))
-unsupported("material", "hair")
+
+
+@_surface("hair")
+def _hair(entity: Entity, job: Job) -> Diffuse:
+    entity.lose("a diffuse surface in its place")
+    return Diffuse(_albedo(entity, "color" if "color" in entity.values else "reflectance", 0.5, job))
 
 
 @converts("medium", "homogeneous")
@@ -282,10 +287,16 @@ def material_of(state: Any, alpha: Value, job: Job, label: Entity) -> Material:
     """Return the material of a shape, with its opacity and its medium."""
     given = state.material
     if isinstance(given, str):
-        given = job.refer("material", given)
+        name, given = given, None
+        with label.lost.part(label.label, done="gray in its place"):
+            given = job.refer("material", name)
     base: Material = GRAY if given is None else job.convert(given)
-    inside = job.medium(state.inside) if state.inside != state.outside else None
-    if state.outside not in ("", state.inside) and job.medium(state.outside) is not job.around:
+    inside = outside = None
+    with label.lost.part(label.label):
+        inside = job.medium(state.inside) if state.inside != state.outside else None
+    with label.lost.part(label.label):
+        outside = job.medium(state.outside) if state.outside != state.inside else None
+    if outside not in (None, job.around) and state.outside not in job.insides:
         label.lose(f"the medium {state.outside!r} outside")
     if alpha is None and inside is None:
         return base

@@ -18,6 +18,7 @@ from ...core.errors import SceneError, in_brief
 from ...core.files import decode_text
 from ...core.suggestions import did_you_mean
 from ..conversion import PlacedError, check_included, placed
+from ..losses import Losses
 from ..sources import SceneFiles
 
 MOST = 1e100  # size of a number: the squares of larger ones overflow
@@ -35,6 +36,8 @@ STATEMENTS = {
     **{"Rotate": "nnnn", "LookAt": "nnnnnnnnn", "TransformTimes": "nn", "ActiveTransform": "w"},
     **{"Texture": "sssp", "MediumInterface": "s?", "Option": "sv"},
 }
+V2 = ("SurfaceIntegrator", "VolumeIntegrator", "Renderer", "Volume", "VolumeRegion")
+OLD = dict.fromkeys(V2, "; it is one of pbrt-v2, and this reads pbrt-v4")
 BLANK = re.compile(r"(?:[ \t\r\n]++|#[^\r\n]*+)*+")
 TOKEN = re.compile(r'"(?:[^"\\\n]|\\.)*+"|[\[\]]|[^\s"\[\]]++')
 LIST = re.compile(r"\[([-+.\deE\s]*+)\]")  # of numbers alone, the common case of long ones
@@ -74,7 +77,7 @@ def statements(files: SceneFiles, path: Path, data: bytes) -> Iterator[Statement
     Raises
     ------
     SceneError
-        If a file is malformed or may not be read, or there are too many. The message names file and line.
+        If there are too many files. What is malformed is left out, and noted with file and line.
     """
     return _Reader(files).read(path, data, 0)
 
@@ -86,16 +89,19 @@ class _Reader:
         self._files, self._included = files, 0
 
     def read(self, path: Path, data: bytes, depth: int) -> Iterator[Statement]:
-        text = _Text(os.fspath(path), decode_text(data))
-        while (statement := text.statement()) is not None:
+        text = _Text(os.fspath(path), decode_text(data), self._files.losses)
+        while (statement := text.sound_statement()) is not None:
             if statement.name not in ("Include", "Import"):
                 yield statement
                 continue
-            self._included += 1
-            check_included(statement.place, self._files, self._included, depth)
-            with placed(statement.place):
+            content = None
+            with self._files.losses.part(statement.place), placed(statement.place):
+                self._included += 1
+                check_included(statement.place, self._files, self._included, depth)
                 file = self._files.find(statement.words[0])
                 content = self._files.read(file)
+            if content is None:
+                continue
             if statement.name == "Import":
                 yield Statement("AttributeBegin", statement.place, [], [], {})
             yield from self.read(file, content, depth + 1)
@@ -106,8 +112,8 @@ class _Reader:
 class _Text:
     """A text that is read from its beginning to its end."""
 
-    def __init__(self, name: str, text: str) -> None:
-        self._name, self._text = name, text
+    def __init__(self, name: str, text: str, losses: Losses) -> None:
+        self._name, self._text, self._losses = name, text, losses
         self._at, self._line, self._counted = 0, 1, 0
 
     @property
@@ -156,6 +162,25 @@ class _Text:
         self._at += len(token)
         return float(token)
 
+    def sound_statement(self) -> Statement | None:
+        """Return the next statement that is not malformed, None at the end; others are noted."""
+        while True:
+            with self._losses.part():
+                return self.statement()
+            self._skip()
+
+    def _skip(self) -> None:
+        """Go on to what may be a statement."""
+        while True:
+            try:
+                token = self._peek()
+            except PlacedError:
+                self._at = (self._text.find("\n", self._at) + 1) or len(self._text)
+                continue
+            if not token or token in STATEMENTS:
+                return
+            self._at += len(token)
+
     def statement(self) -> Statement | None:
         """Return the next statement, None at the end."""
         name = self._peek()
@@ -163,7 +188,7 @@ class _Text:
             return None
         place = self._place
         if name not in STATEMENTS:
-            hint = did_you_mean(name, STATEMENTS)
+            hint = OLD.get(name) or did_you_mean(name, STATEMENTS)
             raise self._error(f"there is no statement {in_brief(name)}{hint}")
         self._next()
         words: list[str] = []
@@ -177,7 +202,7 @@ class _Text:
             elif kind == "n":
                 numbers.append(self._number(name))
             elif kind == "m":
-                numbers = self._values("float", name, place).tolist()
+                numbers = self._values("float", name, *self._words(name, place), place).tolist()
                 if len(numbers) != 16:
                     raise self._error(f"{name} needs 16 numbers in brackets, not {len(numbers)}")
             elif kind == "p":
@@ -189,35 +214,41 @@ class _Text:
         while self._peek().startswith('"'):
             place = self._place
             declared = self._string(statement).split()
-            if len(declared) != 2 or declared[0] not in TYPES:
-                raise PlacedError(
-                    f"{place}: {in_brief(' '.join(declared))} declares no parameter; it must be a type, "
-                    f"which are {', '.join(TYPES)}, and a name"
-                )
-            kind, name = declared
-            if name in found:
-                raise PlacedError(f"{place}: {name} is given twice")
-            found[name] = Parameter(kind, self._values(kind, name, place), place)
+            values, plain = self._words(" ".join(declared), place)
+            with self._losses.part(place), placed(place):
+                if len(declared) != 2 or declared[0] not in TYPES:
+                    raise SceneError(
+                        f"{in_brief(' '.join(declared))} declares no parameter; it must be a type, "
+                        f"which are {', '.join(TYPES)}, and a name"
+                    )
+                kind, name = declared
+                if name in found:
+                    raise SceneError(f"{name} is given twice")
+                found[name] = Parameter(kind, self._values(kind, name, values, plain, place), place)
         return found
 
-    def _values(self, kind: str, name: str, place: str) -> Any:
+    def _words(self, name: str, place: str) -> tuple[list[str], bool]:
+        """Return the words of a value or a list, and whether they can be nothing but numbers."""
         token = self._peek()
         whole = LIST.match(self._text, self._at) if token == "[" else None
         if whole is not None:
             self._at = whole.end()
-            values: list[str] = whole[1].split()
-        elif token == "[":
-            self._next()
-            values = []
-            while (token := self._next()) != "]":
-                if token in ("", "["):
-                    raise PlacedError(f"{place}: the list of {name} has no end")
-                values.append(token)
-        else:
-            values = [self._next()]
+            return whole[1].split(), True
+        if token != "[":
+            return [self._next()], False
+        self._next()
+        values = []
+        while (token := self._next()) != "]":
+            if token in ("", "["):
+                raise PlacedError(f"{place}: the list of {name} has no end")
+            values.append(token)
+        return values, False
+
+    def _values(self, kind: str, name: str, values: list[str], plain: bool, place: str) -> Any:
+        """Return the values of a parameter of a type, given as words."""
         texts = bool(values) and values[0].startswith('"')
         if kind in NUMBERS or (kind == "spectrum" and not texts):
-            if whole is None:  # Python's numbers may have underscores
+            if not plain:  # Python's numbers may have underscores
                 values = [value.replace("_", "?") for value in values]
             return _numbers(kind, name, values, place)
         if kind == "bool":

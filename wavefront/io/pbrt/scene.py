@@ -21,6 +21,7 @@ from ..repair import RawMesh
 from ..sources import SceneFiles
 from . import lights, materials, textures  # noqa: F401  they fill the table
 from .entities import Entity, Job
+from .older import upgrade
 from .parser import Parameter, Statement, statements
 from .shapes import place, place_object
 from .views import exposure_of, mirror_of
@@ -92,20 +93,22 @@ class Reader:
     def finish(self) -> Scene:
         """Return the scene."""
         job = self.job
-        if self.stack:
-            raise SceneError(f"{self.stack[-1][1]}: {self.stack[-1][0]} has no end")
+        for name, where, _ in self.stack:
+            job.files.losses.note(f"{name} has no end", where, done="it ends with the file")
         camera, film = self.options.get("Camera"), self.options.get("Film")
         # of pbrt, where nothing is stated
         settings = {"filter": GaussianFilter(windowed=True), "spp": 16, "max_bounces": 5}
         job.exposure = exposure_of(film, camera)
         if camera is not None:
             job.world = mirror_of(camera)
-            with placed(camera.label):
+            with job.files.losses.part(camera.label):
                 job.around = job.medium(camera.state.outside)
             job.film = ((1280, 720), None) if film is None else job.convert(film)
         for name in ("Sampler", "Integrator", "PixelFilter"):
             if name in self.options:
                 settings |= job.convert(self.options[name])
+        every = [*self.shapes, *(entity for each in self.objects.values() for entity in each)]
+        job.insides = {entity.state.inside for entity in every}
         found = [shape for entity in self.shapes for shape in place(entity, job)]
         for name, matrices in self.uses.items():
             found += place_object(self.objects[name], job, np.array(matrices))
@@ -115,10 +118,11 @@ class Reader:
 
     def _entity(self, kind: str, statement: Statement, target: str, type: str, name: str = "") -> Entity:
         given = self.state.defaults.get(target, {}) | statement.parameters
-        matrix = self.state.matrices[0]
-        return Entity(
-            kind, type, statement.place, given, self.job.files.losses, matrix, self.state, name=name
-        )
+        matrix, losses = self.state.matrices[0], self.job.files.losses
+        entity = Entity(kind, type, statement.place, given, losses, matrix, self.state, name=name)
+        if type:
+            upgrade(entity)
+        return entity
 
     def _still(self, entity: Entity) -> Entity:
         """Note if something moves while the shutter is open."""
@@ -227,7 +231,8 @@ class Reader:
             raise SceneError(f"there is a {kind} {name!r} already")
 
     def _Material(self, statement: Statement) -> None:
-        self._set(material=self._entity("material", statement, "material", statement.words[0]))
+        type = statement.words[0] or "interface"  # as in pbrt
+        self._set(material=self._entity("material", statement, "material", type))
 
     def _make(self, statement: Statement) -> None:
         """Note a named material or medium, whose type is a parameter."""
@@ -237,6 +242,7 @@ class Reader:
         if not entity.type:
             raise SceneError(f"{statement.name} {entity.name!r} has no type")
         del entity.values["type"]
+        upgrade(entity)
         self._name(target, entity.name, entity)
 
     _MakeNamedMaterial = _MakeNamedMedium = _make
@@ -294,7 +300,7 @@ def read_scene(files: SceneFiles, data: bytes, read_mesh: Callable[[Path], list[
     Raises
     ------
     SceneError
-        If it is malformed, or a file that it includes. The message names file and line.
+        If nothing of it can be shown, or a limit is passed. What is damaged is noted with file and line.
     """
 
     def find(reference: str) -> Path:
@@ -304,8 +310,9 @@ def read_scene(files: SceneFiles, data: bytes, read_mesh: Callable[[Path], list[
         return path
 
     reader = Reader(Job(files.name, files, find, read_mesh))
+    reader.job.instead["film"] = ((1280, 720), None), "the default in its place"
     for statement in statements(files, Path(files.name), data):
-        with placed(statement.place):
+        with files.losses.part(statement.place), placed(statement.place):
             reader.run(statement)
     with placed(files.name):
         return reader.finish()

@@ -16,7 +16,7 @@ from ...shapes.transform import EVEN, Matrix, is_even
 from ...textures.base import BaseTexture
 from ..conversion import placed, textures_in
 from ..placing import in_range, moved_raw
-from ..repair import AT_ONCE, RawMesh, build
+from ..repair import AT_ONCE, RawMesh, build, existing
 from ..surfaces import RINGS, SIDES, over_square
 from ..trimesh_import import import_trimesh
 from .entities import Entity, Job, converts, unsupported
@@ -98,7 +98,11 @@ def _ply_mesh(entity: Entity, job: Job) -> RawMesh:
     raws = job.once(path, lambda: job.read_mesh(path))
     if not raws:
         raise SceneError(f"{path}: has no faces")
-    raw = job.once((path, "checked"), lambda: _checked(raws[0]))
+    faces = raws[0].faces
+    there = job.once(
+        (path, "there"), lambda: existing(entity.lost, entity.label, faces, len(raws[0].vertices))
+    )
+    raw = raws[0] if there.all() else replace(raws[0], faces=faces[there])
     return replace(raw, name=path.name.partition(".")[0], colors=None)
 
 
@@ -135,37 +139,35 @@ def _arrays(entity: Entity, corners: int) -> RawMesh:
         if len(vertices) != corners:
             raise SceneError(f"has {len(vertices)} points and no indices")
         indices = np.arange(corners)
-    if len(indices) % corners:
-        raise SceneError(f"has {len(indices)} indices; a face has {corners}")
-    raw = _checked(RawMesh(entity.type, vertices, indices.astype(np.intp).reshape(-1, corners)))
+    whole = len(indices) // corners * corners
+    if whole < len(indices):
+        entity.lose(f"has {len(indices)} indices; a face has {corners}; the last ones left out")
+    faces = indices[:whole].astype(np.intp).reshape(-1, corners)
+    there = existing(entity.lost, entity.label, faces, len(vertices))
+    raw = RawMesh(entity.type, vertices, faces[there])
     given = entity.get("uv", PAIRS)
     if given is None:
         given = entity.get("st", PAIRS)
-    raw.normals = entity.array("N", NORMALS)
+    raw.normals = _rows(entity, "N", entity.array("N", NORMALS), len(vertices))
     if given is not None:
-        if len(given) % 2:
-            raise SceneError(f"uv has {len(given)} numbers; it must be pairs")
-        raw.uvs = given.reshape(-1, 2)
-    for name, rows in (("uv", raw.uvs), ("N", raw.normals)):
-        if rows is not None and len(rows) != len(vertices):
-            raise SceneError(f"{name} has {len(rows)} rows; P has {len(vertices)}")
+        given = given[: len(given) // 2 * 2].reshape(-1, 2)
+    raw.uvs = _rows(entity, "uv", given, len(vertices))
     return raw
 
 
-def _checked(raw: RawMesh) -> RawMesh:
-    """Return a mesh, if its faces use vertices that there are."""
-    if raw.faces.size and not (raw.faces.min() >= 0 and raw.faces.max() < len(raw.vertices)):
-        i, j = np.argwhere((raw.faces < 0) | (raw.faces >= len(raw.vertices)))[0]
-        raise SceneError(
-            f"face {i} uses vertex {raw.faces[i, j]}; it must be in [0, {len(raw.vertices) - 1}]"
-        )
-    return raw
+def _rows(entity: Entity, name: str, rows: Doubles | None, count: int) -> Doubles | None:
+    """Return values of vertices; None, which is noted, if there is not one for each."""
+    if rows is None or len(rows) == count:
+        return rows
+    entity.lose(f"{name} has {len(rows)} rows; P has {count}; left out")
+    return None
 
 
 def place(entity: Entity, job: Job) -> list[Shape]:
     """Return a shape where it stands in the scene."""
-    with placed(entity.label):
+    with job.files.losses.part(entity.label), placed(entity.label):
         return _shapes(entity, job, job.world @ entity.matrix, entity.state.area)
+    return []
 
 
 def place_object(entities: Sequence[Entity], job: Job, matrices: Matrix) -> list[Shape]:
@@ -173,7 +175,7 @@ def place_object(entities: Sequence[Entity], job: Job, matrices: Matrix) -> list
     even = is_even(matrices, EVEN)
     shapes: list[Shape] = []
     for entity in entities:
-        with placed(entity.label):
+        with job.files.losses.part(entity.label), placed(entity.label):
             job.count_instances(len(matrices))
             if entity.state.area is not None:
                 entity.lose("the light of a shape in an object")
@@ -181,8 +183,10 @@ def place_object(entities: Sequence[Entity], job: Job, matrices: Matrix) -> list
             if any(_mappings(shape.material) for shape in made):
                 entity.lose("where its instances are; all have the texture coordinates of the object")
             shapes += made
-    with placed(entities[0].label if entities else job.name):
+    label = entities[0].label if entities else job.name
+    with job.files.losses.part(label), placed(label):
         return list(Group(shapes).placed(job.world @ matrices @ np.linalg.inv(job.world)))
+    return []
 
 
 def _shapes(entity: Entity, job: Job, matrix: Matrix, light: Entity | None, even: bool = True) -> list[Shape]:

@@ -138,7 +138,9 @@ def color(entity: Entity, name: str, default: Any, job: Job, use: str = "albedo"
     """Return a parameter that is a number, a color or a texture."""
     given = entity.values.get(name)
     if given is not None and given.type == "texture":
-        return job.convert(job.refer("spectrum texture", entity.get(name, ("texture",))[0]))
+        return entity.or_default(
+            default, lambda: job.convert(job.refer("spectrum texture", entity.get(name, ("texture",))[0]))
+        )
     return entity.spectrum(name, default, job, use)
 
 
@@ -146,7 +148,9 @@ def scalar(entity: Entity, name: str, default: float, job: Job) -> Value:
     """Return a parameter that is a number or a texture of numbers."""
     given = entity.values.get(name)
     if given is not None and given.type == "texture":
-        return job.convert(job.refer("float texture", entity.get(name, ("texture",))[0]))
+        return entity.or_default(
+            default, lambda: job.convert(job.refer("float texture", entity.get(name, ("texture",))[0]))
+        )
     return entity.number(name, default)
 
 

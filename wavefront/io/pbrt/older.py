@@ -1,0 +1,54 @@
+"""Types of pbrt-v2 and pbrt-v3, as the nearest ones of pbrt-v4.
+
+Source: pbrt.org, "pbrt-v3 Input File Format" and "pbrt-v2 Input File Format".
+"""
+
+from __future__ import annotations
+
+from .entities import TABLE, Entity
+
+COLORS = ("reflectance", "Kd", "color", "Kr", "albedo")  # parameters of materials
+SHAPES = ("cone", "paraboloid", "hyperboloid", "nurbs", "heightfield")
+# by kind and type: the nearest type, and its names of parameters; None: there is none
+OLDER: dict[tuple[str, str], tuple[str | None, dict[str, str]]] = {
+    ("material", "matte"): ("diffuse", {"Kd": "reflectance", "bumpmap": "displacement"}),
+    **{
+        ("material", name): ("coateddiffuse", {"Kd": "reflectance", "bumpmap": "displacement"})
+        for name in ("plastic", "substrate", "uber", "shinymetal")
+    },
+    ("material", "glass"): ("dielectric", {"index": "eta", "bumpmap": "displacement"}),
+    ("material", "mirror"): ("conductor", {"Kr": "reflectance", "bumpmap": "displacement"}),
+    ("material", "metal"): ("conductor", {"bumpmap": "displacement"}),
+    ("material", "translucent"): ("diffusetransmission", {"Kd": "reflectance"}),
+    ("material", "disney"): ("diffuse", {"color": "reflectance"}),
+    ("material", "kdsubsurface"): ("diffuse", {"Kd": "reflectance"}),
+    ("material", "fourier"): ("diffuse", {}),
+    ("film", "image"): ("rgb", {}),
+    ("area light", "area"): ("diffuse", {}),
+    **{
+        ("sampler", name): ("independent", {})
+        for name in ("lowdiscrepancy", "02sequence", "random", "maxmindist", "bestcandidate", "adaptive")
+    },
+    **{("integrator", name): ("path", {}) for name in ("directlighting", "whitted", "exphotonmap")},
+    **dict.fromkeys([("shape", name) for name in SHAPES], (None, {})),
+}
+
+
+def upgrade(entity: Entity) -> None:
+    """Give an entity of an older version, or a material that is unknown, the nearest type, which is noted."""
+    kind = entity.kind.removeprefix("float ").removeprefix("spectrum ")
+    nearest, names = OLDER.get((kind, entity.type), (None, {}))
+    given = next((name for name in COLORS if name in entity.values), None)
+    if (kind, entity.type) in OLDER:
+        done = f"as {nearest!r}" if nearest else "left out"
+        entity.lose(f"is of pbrt-v3 or older, and this reads pbrt-v4; {done}")
+    elif kind == "material" and (kind, entity.type) not in TABLE and given is not None:
+        entity.lose("pbrt has no such material; a diffuse surface of its color in its place")
+        nearest, names = "diffuse", {given: "reflectance"}
+    elif kind == "light" and "mapname" in entity.values:
+        entity.lose("mapname is of pbrt-v3, and this reads pbrt-v4; as filename")
+        names = {"mapname": "filename"}
+    entity.type = nearest or entity.type
+    for old, new in names.items():
+        if old in entity.values:
+            entity.values.setdefault(new, entity.values.pop(old))
