@@ -207,7 +207,7 @@ def test_the_sun_at_a_time(model: list[Any], calls_of: Any) -> None:
         ({"sun_direction": [0, 0, -1]}, "above the horizon"),
         ({"month": 13}, "month is 13"),
         ({"month": 2, "day": 30}, r"sun \(sunsky\): the time of its sun: day is out of range"),
-        ({"albedo": {"type": "checkerboard"}, "sun_direction": [0, 0, 1]}, "albedo is a texture"),
+        ({"albedo": {"type": "checkerboard"}, "sun_direction": [0, 0, 1]}, "albedo, a texture"),
     ],
 )
 def test_a_malformed_sky_is_refused(model: list[Any], parameters: dict[str, Any], message: str) -> None:

@@ -49,7 +49,7 @@ class Part:
             return False
         place = self._place
         if what.startswith(f"{self._losses.name} "):  # it names its own place
-            place, _, what = what.partition(": ")
+            place, what = what.split(": ", 1) if ": " in what else (place, what)
         self._losses.note(what, "" if place and what.startswith(place) else place, done=self._done)
         return True
 
