@@ -44,6 +44,14 @@ CALLS: dict[str, dict[str, Any]] = {
         "t": P3,
         "size": (4, 4),
     },
+    "Camera.from_matrix": {"cam_to_world": np.eye(4)},
+    "Camera.framing": {"scene": SCENE},
+    "Camera.orthographic": {"origin": (0, 0, 4), "target": P3, "height": 2},
+    "Camera.panorama": {"origin": P3},
+    "Conductor.named": {"name": "gold"},
+    "Dielectric.named": {"name": "glass"},
+    "Instance.many": {"mesh": MESH, "transforms": [np.eye(4)]},
+    "Sky.hosek_wilkie": {"turbidity": 3, "ground_albedo": 0.2, "sun": (0, 1, 0)},
     "Capsules": ENDS,
     "Cylinders": ENDS,
     "DirectionalLight": {"direction": (0, -1, 0), "irradiance": 1},
@@ -150,6 +158,7 @@ FLAGS = {
     "Plastic": ("nonlinear", "multiscatter"),
     "OrenNayar": ("energy_preserving",),
     "OpenPBR": ("geometry_thin_walled",),
+    "Sky.hosek_wilkie": ("disk",),
     "GaussianFilter": ("windowed",),
     "Material": ("visible_to_camera",),
     "Texture": ("srgb",),
@@ -186,3 +195,15 @@ def test_only_numbers_that_have_a_range_of_their_own_are_odd() -> None:
                     pass
     strange = {"object", "nan", "complex", "truths", "words", "ragged", "none in it", "function", "bytes"}
     assert [each for each in sorted(accepted) if each[2] in strange] == []
+
+
+@pytest.mark.parametrize("value", [kind for kind in ODD if kind != "empty dict"])
+def test_methods_of_shapes_and_pictures_name_their_arguments(value: str) -> None:
+    odd: Any = ODD[value]
+    for shape in (MESH, BALL, wf.Spheres([P3], 1)):
+        with pytest.raises(wf.SceneError, match="matrix"):
+            shape.transformed(odd)
+        with pytest.raises(wf.SceneError, match="offset"):
+            shape.translated(odd)
+    with pytest.raises(wf.SceneError, match="gamma"):
+        PICTURE.to_uint8(gamma=odd)

@@ -9,7 +9,7 @@ import numpy as np
 
 from ..arrays.vec import Floats, broadcast, f4
 from ..colors import rgb
-from ..core.errors import SceneError, in_brief, one_of
+from ..core.errors import SceneError, in_brief, one_of, text
 from ..core.parameter import Parameter, parametrized
 from ..core.suggestions import suggests_keywords
 from ..textures.base import BaseTexture
@@ -43,7 +43,7 @@ SPELLINGS = {"aluminium": "aluminum", "chrome": "chromium"}
 
 def _metal(title: str, name: Any) -> Any:
     """Return the name of a metal as it is in the table."""
-    key = name.lower() if isinstance(name, str) else name
+    key = text(title, name).lower()
     return one_of(title, SPELLINGS.get(key, key), METALS)
 
 

@@ -353,7 +353,13 @@ class Camera(Answers):
         >>> camera = wf.Camera.framing(ball, view="front", aperture=0.2, size=64)
         >>> image = wf.render(ball, 1, camera=camera)
         """
-        camera: Camera = _FRAMED[0](scene, view, fov, size, up)
+        number("aperture", aperture)
+        try:
+            camera: Camera = _FRAMED[0](scene, view, fov, size, up)
+        except SceneError as error:
+            if not str(error).startswith("direction"):
+                raise
+            raise SceneError(f"view{str(error).removeprefix('direction')}") from error
         return camera.replace(aperture=aperture or None, focus=focus)
 
     @suggests_keywords
@@ -718,8 +724,7 @@ def _axes(backward: Doubles, up: ArrayLike) -> Doubles:
 
 def _axes_of(convention: str) -> tuple[int, int, int]:
     """Return the signs of right, up and backward in the axes x, y and z of a convention."""
-    if convention not in ("opengl", "opencv"):
-        raise SceneError(f"convention is {convention!r}; it must be 'opengl' or 'opencv'")
+    one_of("convention", convention, ("opengl", "opencv"))
     return (1, -1, -1) if convention == "opencv" else (1, 1, 1)
 
 

@@ -52,7 +52,7 @@ def check_gamma(gamma: Gamma) -> Gamma:
     SceneError
         If it is neither a number from 0.01 to 100 nor "srgb".
     """
-    if gamma == "srgb":
+    if isinstance(gamma, str) and gamma == "srgb":
         return gamma
     low, high = coded.GAMMAS
     if isinstance(gamma, str):

@@ -17,7 +17,7 @@ from ..arrays.vec import Doubles, Floats, column, dot, f4
 from ..camera import upward
 from ..colors import DAYLIGHT, EFFICACY, Photometric, from_photometric, rgb
 from ..colors.photometry import photometric
-from ..core.errors import SceneError, finite_array, number
+from ..core.errors import SceneError, finite_array, flag, number
 from ..core.parameter import Parameter, Parametrized, brief, instance_of, optional, parametrized
 from ..core.suggestions import suggests_keywords
 from ..film.aov_names import DEFAULT_GROUP, group_name
@@ -331,7 +331,7 @@ class Sky(Parametrized, FarLight):
             sun,
             up,
             horizontal=scaled[1],
-            direct_normal=scaled[0] if disk else 0.0,
+            direct_normal=scaled[0] if flag("Sky disk", disk) else 0.0,
             ground=ground,
             efficacy=efficacy,
             group=group,
@@ -388,7 +388,7 @@ class Sky(Parametrized, FarLight):
             sun,
             up,
             scale=factor * radiance,
-            direct_normal=factor * solar if disk else 0.0,
+            direct_normal=factor * solar if flag("Sky disk", disk) else 0.0,
             ground=albedo if ground is None else ground,
             efficacy=EFFICACY,
             group=group,

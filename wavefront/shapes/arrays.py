@@ -85,7 +85,7 @@ class PrimitiveArray(ColoredShape, CurvedShape):
 
     def transformed(self, matrix: ArrayLike) -> Self:
         """Return a copy that is moved, turned, mirrored or scaled by one factor: as `placed`."""
-        return self.placed(finite_array(f"{self.name}: transform", matrix, (4, 4)))
+        return self.placed(finite_array(f"{self.name}: transform matrix", matrix, (4, 4)))
 
     def check(self) -> None:
         """Check the arrays against each other; they may have been assigned one by one.

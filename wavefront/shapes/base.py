@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike
 
 from ..arrays.vec import Doubles
 from ..bsdfs import Diffuse
-from ..core.errors import number, text
+from ..core.errors import number, shape_of, text
 from ..core.parameter import Parameter
 from ..core.suggestions import Answers, suggests_keywords
 from ..materials import Material, MaterialLike, as_material
@@ -168,7 +168,7 @@ class Shape(Answers, ABC):
         >>> wf.Sphere((1, 0, 0), 0.5).scaled(2).bounds.tolist()
         [[1.0, -1.0, -1.0], [3.0, 1.0, 1.0]]
         """
-        if np.ndim(factor) == 0:
+        if shape_of(factor) == ():
             one = number(f"{self.name}: factor", factor, lambda x: x != 0, "other than 0")
             if one > 0:
                 return self.lengths_times(one)

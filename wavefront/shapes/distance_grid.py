@@ -182,7 +182,7 @@ class SignedDistanceGrid(CurvedShape):
     def transformed(self, matrix: ArrayLike) -> Self:
         """Return a copy that is transformed by any affine matrix that can be inverted."""
         shape = copy(self)
-        shape.transform = finite_array(f"{self.name}: transform", matrix, (4, 4)) @ self.transform
+        shape.transform = finite_array(f"{self.name}: transform matrix", matrix, (4, 4)) @ self.transform
         return shape
 
     def lengths_times(self, factor: float) -> Self:

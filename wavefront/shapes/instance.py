@@ -114,6 +114,8 @@ class Instance(Shape):
         SceneError
             As for `Instance`. The message names the first invalid transform.
         """
+        if not isinstance(mesh, Mesh):
+            raise SceneError(f"{name or 'instance'}: mesh must be a wf.Mesh, got {in_brief(mesh)}")
         label = mesh.name if name is None else name
         matrices = finite_array(f"{label}: transforms", transforms, (None, 4, 4))
         bad = np.flatnonzero(~can_place(mesh, matrices))
@@ -160,7 +162,7 @@ class Instance(Shape):
 
     def transformed(self, matrix: ArrayLike) -> Self:
         """Return a copy that is placed by a further matrix (4, 4), as of every `Shape`."""
-        placing = _invertible(f"{self.name}: transform", matrix)
+        placing = _invertible(f"{self.name}: transform matrix", matrix)
         instance = copy(self)
         instance.transform = placing @ self.transform
         check_range(self.name, _placed(instance.transform, self.mesh.vertices).T)

@@ -271,7 +271,7 @@ class Mesh(ColoredShape):
 
     def transformed(self, matrix: ArrayLike) -> Self:
         """Return a copy that is placed by an affine matrix (4, 4), as of every `Shape`."""
-        placing = finite_array(f"{self.name}: transform", matrix, (4, 4))
+        placing = finite_array(f"{self.name}: transform matrix", matrix, (4, 4))
         mesh = copy(self)
         mesh.vertices, mesh.faces, mesh.normals = moved(placing, self.vertices, self.faces, self.normals)
         mesh.tangents = moved_tangents(placing, self.tangents)

@@ -110,7 +110,7 @@ class Sphere(SphereEmission):
 
     def transformed(self, matrix: ArrayLike) -> Self:
         """Return a copy that is moved, turned, mirrored or scaled by one factor: as `placed`."""
-        return self.placed(matrix)
+        return self.placed(finite_array(f"{self.name}: transform matrix", matrix, (4, 4)))
 
     def lengths_times(self, factor: float) -> Self:
         """Return the sphere with all lengths multiplied by `factor`."""
