@@ -47,6 +47,7 @@ VALUES: dict[str, Any] = {  # of each setting, one that is not its default
     "workers": 2,
     "executor": "threads",
     "noise": 0.9,
+    "quality": "reference",
     "seconds": 0.05,
     "filter": "tent",
     "light_sampler": "power",

@@ -928,10 +928,10 @@ def test_a_viewer_refuses_what_it_cannot_do() -> None:
 def test_a_viewer_takes_the_samples_that_render_takes(capsys: pytest.CaptureFixture[str]) -> None:
     with wf.view(BALL, size=(16, 16), port=0, open_browser=False, block=False) as viewer:
         spp = viewer.wait_for_picture(SOON).spp
-    assert spp == wf.render(BALL, size=(16, 16), progress=False).spp
+    assert spp == wf.render(BALL, size=(16, 16), progress=False, quality="reference").spp
     with pytest.raises(SystemExit):
         main(["view", "--help"])
-    assert f"samples per pixel (default: {spp})" in capsys.readouterr().out
+    assert f"samples per pixel (default: as --quality says; {spp} in the viewer)" in capsys.readouterr().out
 
 
 def test_a_viewer_that_is_closed_says_so() -> None:

@@ -109,7 +109,8 @@ def compare(a: Picture, b: Picture) -> Comparison:
     at worst, so that such a test finds less than one of pictures with different seeds. Of pictures with
     `reuse=True`, whose pixels share noise, those of blocks take the errors of their tiles from batches of
     samples, and that of the mean takes tiles as samples; where a file does not keep them (exr), they take the
-    worst case, and find less. Sources are in `wavefront/statistics/significance.py`.
+    worst case, and find less. Those of denoised pictures are of the samples, before denoising;
+    the other measures are of what is shown. Sources are in `wavefront/statistics/significance.py`.
 
     FLIP needs `pip install flip-evaluator`. For two pictures of 8 bits it is LDR-FLIP, else
     HDR-FLIP (P. Andersson et al., FLIP, 2020, and Visualizing Errors in Rendered High Dynamic Range
@@ -142,7 +143,7 @@ def compare(a: Picture, b: Picture) -> Comparison:
     squared = np.square(left - right)
     rmse = float(np.sqrt(squared.mean()))
     flip, flip_absent = _flip(left, right, coded)
-    p, p_absent, shared = _tested(a, b, left, right)
+    p, p_absent, shared = _tested_samples(names, a, b, left, right)
     return Comparison(
         relative_mse=float((squared / (np.square(right) + (EPSILON * right.mean() ** 2 or 1.0))).mean()),
         rmse=rmse,
@@ -212,6 +213,21 @@ def _untestable(name: str, picture: Image | ArrayLike) -> str:
     if picture.counts.min() < 2 or not np.isfinite(picture.standard_error).all():
         return f"not computed: {name} has pixels with fewer than two samples"
     return ""
+
+
+def _tested_samples(
+    names: tuple[str, str], a: Image | ArrayLike, b: Image | ArrayLike, left: Doubles, right: Doubles
+) -> tuple[Significance | None, str, str]:
+    """Return the same as `_tested`, of the samples of pictures that were denoised."""
+    before = [picture.noisy if isinstance(picture, Image) else None for picture in (a, b)]
+    if before[0] is None and before[1] is None:
+        return _tested(a, b, left, right)
+    a, b = (noisy or given for noisy, given in zip(before, (a, b), strict=True))
+    if not all(np.isfinite(noisy.rgb).all() for noisy in before if noisy is not None):
+        return None, "not computed: samples are not finite", ""
+    p, absent, shared = _tested(a, b, _pixels(names[0], a), _pixels(names[1], b))
+    said = "p-values are of the samples, before denoising"
+    return p, absent, f"{shared}; {said}" if shared else said
 
 
 def _tested(

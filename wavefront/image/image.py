@@ -254,7 +254,7 @@ class Image(Answers):
         The error comes from the difference of two halves of the samples, summed over the pixels, and where
         they are few also from the scatter of batches of samples; what stratified samples gain beyond half of
         them is extrapolated. Pixels that share paths are correlated within tiles, so there the differences
-        of the sums over tiles count. Other pixels are independent.
+        of the sums over tiles count. Other pixels are independent. Of a denoised picture the samples count.
 
         Parameters
         ----------
@@ -284,6 +284,9 @@ class Image(Answers):
         >>> ball.pixels == image.mean(image.shape_id == 0).pixels
         True
         """
+        noisy = self.noisy
+        if noisy is not None:
+            return noisy.mean(region, kind)
         errors = PixelErrors(self.standard_error, self.freedom(), self.scatter, self._alone(), self.halves)
         where = self._region(region, kind)
         return region_mean(self.rgb, where, errors, self._most(where), self._error_absent())

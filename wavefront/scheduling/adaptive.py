@@ -12,6 +12,8 @@ from ..arrays.vec import Ints, distinct
 from ..film.film import MUCH_RARE, OUTLIERS, Film
 
 MIN_SPP = 32  # before anything is decided by an error estimate
+QUICK_SPP = 4  # likewise, for a picture that is denoised
+EXACT = 1e-6  # squared error, relative to the greatest, below which a pixel does not count there
 MOST_RARE = 0.9  # part of the squared error, from where on it counts as this part
 
 
@@ -31,6 +33,7 @@ def passes(
     square_of: Ints,
     begun: Pass | None = None,
     everywhere: bool = False,
+    quick: bool = False,
 ) -> Iterator[Pass]:
     """Yield what is to be done, one pass after the other; each decides by what is on the film then.
 
@@ -60,26 +63,32 @@ def passes(
     everywhere
         Whether each pixel must have an error of `noise` at most, not the picture: a square gets more samples
         while one of its pixels has more.
+    quick
+        Whether decisions begin at `QUICK_SPP`. Then all pixels get equally many samples.
     """
     pixels = np.arange(film.count.size, dtype=np.uint32)
     if noise is None:
         yield Pass(pixels, 0, spp)
         return
-    if film.light is not None:
+    if film.light is not None or quick:
         square_of = np.zeros_like(square_of)
     sizes = np.maximum(np.bincount(square_of), 1)  # a window of a picture may have none of a square
     first = 0
     if begun is not None:
         pixels, first = begun.pixels, begun.first
     while pixels.size and first < spp:
-        last = min(next_stop(first), spp)
+        last = min(next_stop(first, QUICK_SPP if quick else MIN_SPP), spp)
         yield Pass(pixels, first, last)
         first = last
         error = film.relative_variance(0 if everywhere else OUTLIERS)
+        if quick:
+            error = error.compress(error > error.max() * EXACT)
         # inf where noise**2 would be an error
         limit = noise * noise * _trust(film.rare_part(error))
         if (error.max() if everywhere else error.mean()) <= limit:
             return
+        if quick:
+            continue
         above = np.bincount(square_of, error > limit) > 0
         noisy = above if everywhere else np.bincount(square_of, error) / sizes > limit
         pixels = pixels[noisy[square_of[pixels]]]
@@ -97,9 +106,9 @@ def unfinished(film: Film, step: Pass) -> Iterator[Pass]:
         yield Pass(step.pixels[count == done], done, step.last)
 
 
-def next_stop(samples: int) -> int:
+def next_stop(samples: int, least: int = MIN_SPP) -> int:
     """Return the samples at the decision after that at `samples`: powers of two and halfway between."""
-    if samples < MIN_SPP:
-        return MIN_SPP
+    if samples < least:
+        return least
     power = 1 << (samples.bit_length() - 1)
     return power * 3 // 2 if samples < power * 3 // 2 else power * 2

@@ -33,6 +33,8 @@ class RenderLoop:
         Sizes the jobs and keeps the time.
     spp, noise, seconds, progress
         As for `render`; `spp` is the most samples that a pixel may get.
+    quick
+        Whether the error is looked at early, as the picture will be denoised.
     begun
         The pass under way, if the accumulator has samples of an earlier part of the render.
 
@@ -59,10 +61,11 @@ class RenderLoop:
         seconds: float | None,
         progress: Progress,
         begun: Pass | None = None,
+        quick: bool = False,
     ) -> None:
         self.view, self.accumulator, self.scheduler = view, accumulator, scheduler
         self.spp, self.step = spp, begun
-        self._noise, self._seconds, self._progress = noise, seconds, progress
+        self._noise, self._seconds, self._progress, self._quick = noise, seconds, progress, quick
         self.stopped = self.interrupted = False
         self.failure: Exception | None = None
 
@@ -106,7 +109,7 @@ class RenderLoop:
                 if film.count.any():  # those of an earlier part of the render
                     bar.advance(self.accumulator.samples, self.scheduler.elapsed)
                 squares, everywhere = self.view.squares(), self.view.camera.sensor is not None
-                for step in passes(film, self.spp, self._noise, squares, self.step, everywhere):
+                for step in passes(film, self.spp, self._noise, squares, self.step, everywhere, self._quick):
                     self.step = step
                     if step.first:
                         yield True

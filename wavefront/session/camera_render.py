@@ -95,6 +95,7 @@ class CameraRender:
             seconds=settings.values["seconds"],
             progress=settings.values["progress"],
             begun=begun,
+            quick=settings.quick,
         )
 
     def sweeps(
@@ -206,6 +207,8 @@ class CameraRender:
             "reuse": plan.choice.reuse,
             "hint": plan.choice.hint,
             "accelerator": plan.scene.compiled.accelerator.name,
+            "quality": settings.values["quality"],
+            "quick": settings.quick,
             "workers": plan.budget.workers,
             "executor": EXECUTORS.label(plan.executor),
             "seconds": self.loop.scheduler.elapsed,

@@ -86,6 +86,8 @@ def choose(
     """
     branches, reuse = settings.values["branches"], settings.values["reuse"] is True
     asked = Choice(1 if branches == AUTO else int(branches), reuse, has_guide)
+    if settings.quick and settings.is_full and branches == AUTO and not reuse:
+        return replace(asked, branches=BRANCHES[-1])
     whole = camera.cropped((0, 0, *camera.resolution))  # a window is a part of the same picture
     seed, bounces = settings.training_seed(1), settings.values["max_bounces"]
     if settings.is_full and has_guide and settings.values["guide"] == AUTO:

@@ -99,7 +99,8 @@ def check_last_image(image: Image, plan: Plan, loop: RenderLoop, surfaces: int) 
         integrator = INTEGRATORS.label(values["integrator"])
         warn_of_black_or_white(image, plan.scene, loop.view.camera, integrator, values["max_bounces"])
     ended = time_up or accumulator.film.count.max() == plan.settings.max_spp
-    if values["noise"] is not None and ended and not found["noise"] <= values["noise"]:
+    asked = values["noise"] is not None and not plan.settings.by_itself
+    if asked and ended and not found["noise"] <= values["noise"]:
         noise = "unknown" if np.isnan(found["noise"]) else f"{found['noise']:.4g}"
         warn_caller(
             f"noise={values['noise']:.4g} was not reached: it is {noise} after "

@@ -20,6 +20,7 @@ from ..shapes import Instance
 from .prepared_scene import PreparedScene
 
 LONG = 10.0  # seconds of a render, from which on hints are shown
+NOTICED = 2.0  # likewise, what was done without being asked
 # Solid angle of a lamp at a specular surface, sr; from about 0.015 on, light tracing saves a third at most
 SMALL = 0.01
 MUCH = 0.1  # part of the light at a specular surface
@@ -42,6 +43,7 @@ NO_EMBREE = (
     "Embree is not installed: with `pip install embreex` meshes of {:,} triangles render about {:.0f} times "
     "as fast"
 )
+ENDED = 'the picture is denoised, from {} samples per pixel; quality="reference" takes 100, and does not'
 NO_DENOISER = (
     "Open Image Denoise is not installed: with `pip install pyoidn` denoise=True is faster and removes more "
     "noise"
@@ -110,15 +112,22 @@ class Hints:
         self._told: set[str] = set()
 
     def tell(self, image: Image) -> None:
-        """Write what may help to stderr, a line each, if the last picture took long."""
-        if image.metadata["seconds"] < LONG:
-            return
-        lines = [hint for hint in self._of(image) if hint not in self._told]
+        """Write what was done and what may help to stderr, a line each, if the last picture took long."""
+        seconds = image.metadata["seconds"]
+        found = [
+            *(self._ending(image) if seconds >= NOTICED else ()),
+            *(self._of(image) if seconds >= LONG else ()),
+        ]
+        lines = [hint for hint in found if hint not in self._told]
         self._told.update(lines)
         with suppress(OSError, ValueError, AttributeError):  # without a stderr there is none to see it
             for line in lines:
                 sys.stderr.write(f"hint: {line}\n")
             sys.stderr.flush()
+
+    def _ending(self, image: Image) -> Iterator[str]:
+        if self._settings.quick:
+            yield ENDED.format(image.spp)
 
     def _of(self, image: Image) -> Iterator[str]:
         if image.metadata["hint"] is not None:

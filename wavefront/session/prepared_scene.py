@@ -41,6 +41,8 @@ class PreparedScene:
         The user's.
     preset
         Name of the light that was added; None if there is none.
+    light_is_chosen
+        Whether that light was chosen automatically.
     ground
         Whether a ground was added; "shadow" for one of which only the shadow is seen.
     lighted
@@ -57,7 +59,7 @@ class PreparedScene:
         self.preset, up = choose_preset(scene, values["lighting"]), scene.vertical(values["up"])
         if values["lighting"] == AUTO and self.preset is None and needs_preset(scene, settings, camera):
             self.preset = DEFAULT
-        chosen = values["lighting"] == AUTO and self.preset is not None
+        chosen = self.light_is_chosen = values["lighting"] == AUTO and self.preset is not None
         self.ground = choose_ground(values["ground"], chosen, framed, values["background"], up)
         self.lighted = lighted(scene, self.preset, ground=self.ground, up=up, camera=framed)
         if values["integrator"] == "naive":

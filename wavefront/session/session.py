@@ -117,6 +117,8 @@ class Session:
         # before work, for what takes least; again when the memory of the scene is known
         settings.budget(camera.size, values["executor"] or "threads")
         self._scene = PreparedScene(scene, settings, camera, camera if framed else None)
+        if camera.sensor is None:
+            settings = self._settings = settings.ending(self._scene.light_is_chosen)
         self._hints = Hints(settings, self._scene)
         self._plan = make_plan(settings, self._scene, camera, trained_guide(settings, self._scene, camera))
         self._make_pool()

@@ -12,7 +12,7 @@ from ..camera import upward
 from ..codecs.image_data import TRANSPARENT
 from ..colors import rgb
 from ..compile.scene import ROULETTE_AFTER
-from ..core.errors import SceneError, flag, in_brief, number, warn_caller
+from ..core.errors import SceneError, flag, in_brief, number, one_of, warn_caller
 from ..core.files import check_target
 from ..core.progress import Progress
 from ..core.registry import Registry
@@ -20,6 +20,7 @@ from ..scene.lighting import SHADOW, check_lighting
 from ..scene.scene import view_direction
 
 AUTO = "auto"
+QUALITIES = (AUTO, "reference")
 
 # called with the name and the value of a setting; returns the value as it is kept
 SettingCheck: TypeAlias = Callable[[str, Any], Any]
@@ -87,6 +88,11 @@ def check_noise(name: str, value: Any) -> float:
             f"{name} is {found:g}, a relative error of {100 * found:g} %; {found:g} % is {found / 100:g}"
         )
     return found
+
+
+def check_quality(name: str, value: Any) -> str:
+    """Check that something says when a picture ends."""
+    return one_of(name, value, QUALITIES)
 
 
 def check_progress(name: str, value: Any) -> Progress:

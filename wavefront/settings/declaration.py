@@ -42,6 +42,7 @@ from .checks import (
     check_noise,
     check_preset,
     check_progress,
+    check_quality,
     check_roulette,
     check_samples,
     check_up,
@@ -330,6 +331,18 @@ class RenderSettings(TypedDict, total=False):
             identity=True,
         ),
     ]
+    quality: Annotated[
+        str,
+        Setting(
+            AUTO,
+            'When a picture ends without `spp`, `noise`, `seconds` or `samples`. "auto": where the light was '
+            "chosen, too, it is denoised and ends as soon as it is clean, after 4 to 100 samples per pixel; "
+            "where the scene has a light of its own, it ends at an error of 2 %, after 100 samples at most. "
+            '"reference": 100 samples. docs/choices.md has the rule.',
+            option="when a picture ends where nothing else says it: auto or reference (default: auto)",
+            check=check_quality,
+        ),
+    ]
     seconds: Annotated[
         float | None,
         Setting(
@@ -494,14 +507,14 @@ class RenderSettings(TypedDict, total=False):
         ),
     ]
     denoise: Annotated[
-        bool,
+        bool | None,
         Setting(
-            False,
+            None,
             "Removes most of the noise of the last picture, as `Image.denoise` does. Edges and textures "
             'are kept by the AOVs "denoising_albedo" and "denoising_normal", which are added. '
-            "`image.noisy` is the picture before.",
+            "`image.noisy` is the picture before. None: as `quality` says.",
             option="remove noise from the picture",
-            check=flag,
+            check=optional(flag),
         ),
     ]
     progress: Annotated[
@@ -524,9 +537,11 @@ class AllSettings(RenderSettings, total=False):
         int | None,
         Setting(
             None,
-            "Samples per pixel, at least 1; by default 100. With `noise` or `seconds` the most that a "
-            "pixel gets; by default then 65536, and with `seconds` as many as there is time for.",
-            option="samples per pixel (default: 100); the most there may be with --noise or --seconds",
+            "Samples per pixel, at least 1; by default as many as `quality` says. With `noise` or `seconds` "
+            "the most that a pixel gets; by default then 65536, and with `seconds` as many as there is time "
+            "for.",
+            option="samples per pixel (default: as --quality says; 100 in the viewer); the most there may be "
+            "with --noise or --seconds",
         ),
     ]
 

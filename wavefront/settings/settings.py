@@ -17,11 +17,13 @@ from ..sampling.sampler import SAMPLERS, SamplerMaker, make_sampler
 from ..scheduling.budget import Budget, make_budget
 from ..scheduling.executors import ExecutorLike, choose_executor, worker_count
 from ..stages.reuse import SHARED_WAYS
-from .checks import whole_number
+from .checks import AUTO, whole_number
 from .combinations import check_combinations
 from .declaration import SETTINGS, AllSettings
 
 DEFAULT_SPP = 100
+LITTLE_NOISE = 0.02  # at which a picture ends by itself
+CLEAN = 0.055  # likewise, where it is denoised then
 MAX_BRANCH_SAMPLES = 2**32  # a sample's index is 32 bits of its address, and each branch has one
 TRAINING = 0x5EED_0F_9417D  # the seed of a training pass is that of the picture XOR this
 MAX_SPP_FOR_NOISE = 2**16  # where only `noise` was given
@@ -43,12 +45,18 @@ class Settings:
         The most samples that a pixel may get.
     worker_count
         How many waves are traced at once.
+    quick
+        Whether the picture ends as soon as it is clean once it is denoised.
+    by_itself
+        Whether it ends by itself, so or at little noise.
 
     Raises
     ------
     SceneError
         If one is malformed, or two of them exclude each other.
     """
+
+    quick = by_itself = False
 
     def __init__(self, **given: Unpack[AllSettings]) -> None:
         self._given: dict[str, Any] = {**given}
@@ -82,6 +90,23 @@ class Settings:
         skipped = ("spp",) if given.keys() & {"noise", "seconds", "samples"} else ()
         kept = {name: value for name, value in first.items() if name not in skipped}
         return Settings(**{**kept, **given}) if kept else self
+
+    def ending(self, chosen_light: bool) -> Settings:
+        """Return these settings with an end of the picture, where none of them says it.
+
+        Parameters
+        ----------
+        chosen_light
+            Whether the light of the scene was chosen automatically.
+        """
+        given = (self.values[name] for name in ("spp", "noise", "seconds", "samples"))
+        if self.values["quality"] != AUTO or any(each is not None for each in given):
+            return self
+        quick = chosen_light and self.values["denoise"] is None
+        end: AllSettings = {"denoise": True, "noise": CLEAN} if quick else {"noise": LITTLE_NOISE}
+        ended = Settings(**{**self._given, **end, "spp": DEFAULT_SPP})
+        ended.quick, ended.by_itself = quick, True
+        return ended
 
     def labels(self) -> dict[str, Any]:
         """Return the settings that renders of the same samples have in common; functions by their names."""
