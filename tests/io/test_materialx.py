@@ -104,6 +104,39 @@ def test_gltf_is_translated(load):
     assert material.opacity is None  # its mode is opaque
 
 
+def test_the_preview_surface_of_usd_is_translated(load):
+    given = {
+        "diffuseColor": (0.2, 0.4, 0.6),
+        "metallic": 0.25,
+        "roughness": 0.3,
+        "ior": 1.4,
+        "clearcoat": 0.5,
+    }
+    given |= {"emissiveColor": (1.0, 2.0, 3.0), "clearcoatRoughness": 0.125}
+    material = load(document("UsdPreviewSurface", **given, opacity=0.75))["M"]
+    bsdf = material.bsdf
+    assert bsdf.base_color.ravel() == pytest.approx([0.2, 0.4, 0.6])
+    assert (bsdf.base_metalness, bsdf.coat_weight, bsdf.coat_roughness) == (0.25, 0.5, 0.125)
+    assert (bsdf.specular_roughness, bsdf.specular_ior) == (pytest.approx(0.3), pytest.approx(1.4))
+    assert material.emission.ravel() == pytest.approx([1, 2, 3])
+    assert np.ravel(material.alpha) == pytest.approx(0.75)
+    cut = load(document("UsdPreviewSurface", opacity=0.25, opacityThreshold=0.5))["M"]
+    assert np.ravel(cut.alpha) == pytest.approx(0)
+    whole = load(document("UsdPreviewSurface", opacity=0.75, opacityThreshold=0.5))["M"]
+    assert whole.opacity is None
+
+
+def test_the_principled_surface_of_disney_is_translated(load):
+    given = {"baseColor": (0.2, 0.4, 0.6), "metallic": 0.25, "roughness": 0.3, "specular": 0.25}
+    given |= {"clearcoat": 0.5, "clearcoatGloss": 0.0, "sheen": 0.5, "sheenTint": 1.0, "specTrans": 0.125}
+    bsdf = load(document("disney_principled", **given))["M"].bsdf
+    assert bsdf.base_color.ravel() == pytest.approx([0.2, 0.4, 0.6])
+    assert bsdf.fuzz_color.ravel() == pytest.approx([0.2, 0.4, 0.6])
+    assert bsdf.coat_roughness == pytest.approx(0.1**0.5)
+    found = (bsdf.specular_weight, bsdf.coat_weight, bsdf.fuzz_weight, bsdf.transmission_weight)
+    assert found == (0.5, 0.5, 0.5, 0.125)
+
+
 def test_images(load, image):
     nodes = (
         node("image", "color3", "color", space="srgb_texture")
@@ -164,7 +197,7 @@ UNSUPPORTED = {
         transmission_dispersion_scale=0.5, transmission_weight=0.5
     ),
     "M: OpenPBR: subsurface": document(subsurface_weight=0.5),
-    "M: surfaceshader by disney_principled": document("disney_principled"),
+    "M: surfaceshader by surface_unlit": document("surface_unlit"),
     "the include of 'b.mtlx'": document(nodes='<xi:include href="b.mtlx" xmlns:xi="http://x"/>'),
     "nodes that lead to each other": document(
         nodes=f'<dot name="a" type="color3">{link("in", "color3", "b")}</dot>'

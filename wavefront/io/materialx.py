@@ -1,7 +1,8 @@
 """Materials of MaterialX documents, by the library of that name.
 
 A shading node of another kind than OpenPBR's is translated: standard surface by the graph that the library
-brings, glTF's by a table. Graphs of constants and images are evaluated; of others, the input has its default.
+brings, those of glTF, USD and Disney's model by tables. Graphs of constants and images are evaluated; of
+others, the input has its default.
 """
 
 from __future__ import annotations
@@ -62,6 +63,39 @@ GLTF = {
     "alpha": "geometry_opacity",
     "normal": "geometry_normal",
 }
+USD = {  # of UsdPreviewSurface
+    "diffuseColor": "base_color",
+    "emissiveColor": "emission_color",
+    "metallic": "base_metalness",
+    "roughness": "specular_roughness",
+    "ior": "specular_ior",
+    "clearcoat": "coat_weight",
+    "clearcoatRoughness": "coat_roughness",
+    "opacity": "geometry_opacity",
+    "normal": "geometry_normal",
+}
+DISNEY = {
+    "baseColor": "base_color",
+    "metallic": "base_metalness",
+    "roughness": "specular_roughness",
+    "anisotropic": "specular_roughness_anisotropy",
+    "sheen": "fuzz_weight",
+    "clearcoat": "coat_weight",
+    "specTrans": "transmission_weight",
+    "ior": "specular_ior",
+    "subsurface": "subsurface_weight",
+}
+GLOSSY = (0.1, 0.001)  # α of the clear coat where its gloss is 0 and 1 (Burley 2012)
+
+
+def _coat_roughness(gloss: Any) -> Any:
+    """Return √α of the clear coat of Disney's model by its gloss."""
+    rough, smooth = GLOSSY
+    return np.sqrt(rough + (smooth - rough) * gloss)
+
+
+def _doubled(value: Any) -> Any:
+    return np.clip(2 * value, 0, 1)
 
 
 def _power(a: Any, b: Any) -> Any:
@@ -84,6 +118,7 @@ def _same(value: Any) -> Any:
     return value
 
 
+KINDS = ("open_pbr_surface", "standard_surface", "gltf_pbr", "UsdPreviewSurface", "disney_principled")
 # functions of each channel, and the names of their arguments
 FUNCTIONS: dict[str, tuple[Callable[..., Any], tuple[str, ...]]] = {
     "add": (operator.add, ("in1", "in2")),
@@ -117,9 +152,9 @@ def load_materialx(
 ) -> dict[str, Material]:
     """Read the materials of a MaterialX document (.mtlx). It needs `pip install materialx`.
 
-    Surfaces of OpenPBR, standard surface and glTF become `OpenPBR`. Their inputs may be constants, images,
-    normal maps, and sums, products and the like of these. What is not honored is one warning, which names
-    materials, inputs and nodes.
+    Surfaces of OpenPBR, standard surface, glTF, UsdPreviewSurface and disney_principled become `OpenPBR`.
+    Their inputs may be constants, images, normal maps, and sums, products and the like of these. What is not
+    honored is one warning, which names materials, inputs and nodes.
 
     Parameters
     ----------
@@ -232,7 +267,7 @@ class _Document:
         shader: Any = shaders[0] if shaders else None
         kind = None if shader is None else shader.getCategory()
         definition: Any = None if shader is None else shader.getNodeDef()
-        if definition is None or kind not in ("open_pbr_surface", "standard_surface", "gltf_pbr"):
+        if definition is None or kind not in KINDS:
             self._lose(title, "surfaceshader", kind or "no node")
             return OpenPBR(name=title)
         if node.getInput("displacementshader") is not None:
@@ -242,6 +277,10 @@ class _Document:
             inputs = self._translated(title, inputs)
         if kind == "gltf_pbr":
             inputs = self._of_gltf(title, inputs)
+        if kind == "UsdPreviewSurface":
+            inputs = self._of_usd(title, inputs)
+        if kind == "disney_principled":
+            inputs = self._of_disney(title, inputs)
         return self._made(title, inputs)
 
     def _made(self, title: str, inputs: dict[str, Value]) -> Material:
@@ -298,6 +337,31 @@ class _Document:
         for name in ("iridescence", "dispersion", "anisotropy_strength"):
             if np.any(np.not_equal(inputs.get(name, 0) or 0, 0)):
                 self._lose(title, name, "")
+        return made
+
+    def _of_usd(self, title: str, inputs: dict[str, Value]) -> dict[str, Value]:
+        """Return the inputs of OpenPBR for those of USD's preview surface."""
+        made = {other: inputs[name] for name, other in USD.items()}
+        made["emission_luminance"] = 1.0
+        cutoff = inputs["opacityThreshold"]
+        if isinstance(cutoff, BaseTexture) or cutoff > 0:
+            made["geometry_opacity"] = _combined(_if_greater, [cutoff, made["geometry_opacity"], 0.0, 1.0])
+        if inputs["useSpecularWorkflow"] == 1:
+            self._lose(title, "useSpecularWorkflow", "")
+        if np.any(np.not_equal(inputs["displacement"], 0)):
+            self._lose(title, "displacement", "")
+        return made
+
+    def _of_disney(self, title: str, inputs: dict[str, Value]) -> dict[str, Value]:
+        """Return the inputs of OpenPBR for those of Disney's principled surface."""
+        made = {other: inputs[name] for name, other in DISNEY.items()}
+        made["coat_roughness"] = _combined(_coat_roughness, [inputs["clearcoatGloss"]])
+        made["specular_weight"] = _combined(_doubled, [inputs["specular"]])
+        made["subsurface_color"] = made["transmission_color"] = made["base_color"]
+        tint = _combined(_mix, [inputs["baseColor"], 1.0, inputs["sheenTint"]])
+        made["fuzz_color"] = np.broadcast_to(tint, 3) if not isinstance(tint, BaseTexture) else tint
+        if np.any(np.not_equal(inputs["specularTint"], 0)):
+            self._lose(title, "specularTint", "")
         return made
 
     def _input(self, title: str, shader: Any, declared: Any) -> Value:
