@@ -21,7 +21,6 @@ from wavefront.colors.spectrum import blackbody_spectrum, spectrum_rgb
 from wavefront.io.losses import Losses
 from wavefront.io.mitsuba import convert as _  # noqa: F401  fills the table
 from wavefront.io.mitsuba.nodes import PLUGINS, Node
-from wavefront.io.mitsuba.transforms import frame
 from wavefront.sampling.filters import FILTERS as FILTERS_HERE
 
 OBJ = "v 0 0 0\nv 1 0 0\nv 0 1 0\nvt 0 0\nvt 1 0\nvt 0 1\nf 1/1 2/2 3/3\n"
@@ -179,18 +178,43 @@ def test_grain_runs_around_the_axis_of_a_sphere_and_a_cylinder() -> None:
 
 
 def test_meshes_without_texture_coordinates_have_those_of_mitsuba(tmp_path: Path) -> None:
-    """Weights of the second and third corner; grain along the first axis of the frame of the face."""
+    """Weights of the second and third corner, which grain follows, too."""
     (tmp_path / "a.obj").write_text(QUAD)
     board = {"type": "diffuse", "reflectance": {"type": "checkerboard"}}
-    mesh = shape("obj", filename=str(tmp_path / "a.obj"), bsdf=board)
-    assert mesh.uvs[mesh.faces].tolist() == [[[0, 0], [1, 0], [0, 1]]] * 2
     grain = {"type": "roughconductor", "alpha_u": 0.05, "alpha_v": 0.4}
-    for each in (False, True):
-        mesh = shape("obj", filename=str(tmp_path / "a.obj"), bsdf=grain, face_normals=each)
-        along = frame(normals(mesh)[1])[:, 0]
-        np.testing.assert_allclose(mesh.tangents[mesh.faces[1], :3], [along] * 3, atol=1e-12)
-        assert mesh.tangents[mesh.faces[0], :3].tolist() == [[1, 0, 0]] * 3
+    for bsdf in (board, grain):
+        mesh = shape("obj", filename=str(tmp_path / "a.obj"), bsdf=bsdf)
+        assert mesh.uvs[mesh.faces].tolist() == [[[0, 0], [1, 0], [0, 1]]] * 2
     assert shape("obj", filename=str(tmp_path / "a.obj"), bsdf={"type": "diffuse"}).uvs is None
+
+
+@pytest.mark.parametrize("flip", [False, True])
+@pytest.mark.parametrize("matrix", [np.eye(4), MIRROR])
+def test_a_reflection_turns_the_front_of_a_sphere(flip: bool, matrix: Any) -> None:
+    lamp = {"emitter": {"type": "area"}, "center": [1, 0, 0], "flip_normals": flip, "to_world": matrix}
+    ball = shape("sphere", **lamp)
+    inward = flip != (matrix[0, 0] < 0)
+    assert isinstance(ball, wf.Mesh) == inward
+    if inward:
+        middle = ball.vertices[ball.faces].mean(1) - matrix[:3, 0]
+        assert ((normals(ball) * middle).sum(1) < 0).all()
+        assert ((ball.normals * (ball.vertices - matrix[:3, 0])).sum(1) < 0).all()
+    textured = shape("sphere", bsdf={"type": "diffuse", "reflectance": {"type": "checkerboard"}}, **lamp)
+    plain = shape(
+        "sphere", bsdf={"type": "diffuse", "reflectance": {"type": "checkerboard"}}, center=[1, 0, 0]
+    )
+    if isinstance(textured, wf.Mesh):  # its texture is mirrored with it
+        found, at = matrix[:3, :3] @ np.array([0, 0.6, 0.8]), textured.vertices - matrix[:3, 0]
+        u, v = textured.uvs[np.abs(at - found).sum(1).argmin()]
+        local = plain.transform.T @ [0, 0.6, 0.8]
+        expected = np.arctan2(local[0], local[2]) / (2 * np.pi) + 0.5, 1 - np.arccos(local[1]) / np.pi
+        assert (u, v) == pytest.approx(expected, abs=0.02)
+
+
+def test_the_back_of_a_masked_ball_is_seen_and_black() -> None:
+    bsdf = {"type": "mask", "opacity": 0.5, "b": {"type": "diffuse"}}
+    assert isinstance(shape("sphere", bsdf=bsdf).material.bsdf, wf.Sides)
+    assert not isinstance(shape("sphere", bsdf={"type": "diffuse"}).material.bsdf, wf.Sides)
 
 
 def test_all_light_of_a_masked_emitter_is_seen() -> None:
@@ -205,6 +229,9 @@ def test_all_light_of_a_masked_emitter_is_seen() -> None:
         image = wf.render(made, spp=256, max_bounces=1, progress=False)
         error = 3 / opacity * np.sqrt(opacity / (256 * 64))
         assert image.rgb.mean() == pytest.approx(3 + (1 - opacity) + 0.5 * opacity, abs=4 * error)
+    bsdf = {"type": "mask", "opacity": 0.5, "b": {"type": "diffuse"}}
+    ball = scene(ball={"type": "sphere", "bsdf": bsdf, "emitter": {"type": "area"}})
+    wf.render(ball, spp=1, size=(4, 4), progress=False)
     board = {"type": "bitmap", "data": np.array([[[0.5], [1.0]]], np.float32), "raw": True}
     bsdf = {"type": "mask", "opacity": board, "b": {"type": "diffuse"}}
     made = scene(lamp={"type": "rectangle", "bsdf": bsdf, **lamp}).shapes[0]

@@ -81,7 +81,7 @@ def as_meshes(shapes: Sequence[Shape], name: str, losses: Losses) -> list[Shape]
     for shape in shapes:
         raw = None
         if isinstance(shape, Sphere):
-            raw = _ball(shape)
+            raw = ball(shape)
         elif isinstance(shape, Cylinders):
             raw = stacked("", _pipes(shape))
         if raw is None:
@@ -98,9 +98,10 @@ def _pipes(shape: Cylinders) -> list[RawMesh]:
     return [_pipe(*each) for each in zip(shape.starts, shape.ends, radii, strict=True)]
 
 
-def _ball(sphere: Sphere) -> RawMesh:
-    """Return a sphere as a mesh, with its texture coordinates."""
-    turn = np.eye(3) if sphere.transform is None else sphere.transform
+def ball(sphere: Sphere, turn: Doubles | None = None) -> RawMesh:
+    """Return a sphere as a mesh, with its texture coordinates; turned by a matrix in place of its own."""
+    if turn is None:
+        turn = np.eye(3) if sphere.transform is None else sphere.transform
 
     def point(u: Doubles, v: Doubles) -> tuple[Doubles, Doubles]:
         (sin, cos), (up, level) = sin_cos_turns(u - 0.5), sin_cos_turns(v / 2 - 0.25)

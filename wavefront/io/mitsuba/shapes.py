@@ -25,7 +25,7 @@ from ..pbrt.shapes import facing
 from ..pbrt.textures import computed
 from ..placing import moved_raw
 from ..repair import RawMesh, build, with_corners_apart
-from ..surfaces import as_meshes
+from ..surfaces import as_meshes, ball
 from ..volumes import parsed_grid
 from .attributes import with_attribute
 from .bsdfs import is_one_sided
@@ -105,7 +105,9 @@ def _cylinder(node: Node, job: Job) -> list[Shape]:
     return _mesh(node, job, RawMesh("cylinder", vertices, faces, np.tile(across, (2, 1)), uvs))
 
 
-@plugin("sphere", "shape", f"{SURFACE} center radius", PARTS, note="one radius")
+@plugin(
+    "sphere", "shape", f"{SURFACE} center radius", PARTS, note="one radius; a mesh where its front is inside"
+)
 def _sphere(node: Node, job: Job) -> list[Shape]:
     center = node.vector("center", (0, 0, 0))
     radius = node.number("radius", 1.0, lambda x: x > 0, "above 0")
@@ -113,24 +115,33 @@ def _sphere(node: Node, job: Job) -> list[Shape]:
     scale = np.linalg.svd(matrix[:3, :3], compute_uv=False)
     if scale[0] - scale[2] > ROUND * scale[0]:
         node.lose("to_world, which scales unevenly")
-    if node.flag("flip_normals"):
-        node.lose("flip_normals")
+    mirrored = bool(np.linalg.det(matrix[:3, :3]) < 0)
+    inward = node.flag("flip_normals") != mirrored  # a reflection turns the normals, but of no other shape
     center = matrix[:3, :3] @ center + matrix[:3, 3]
     radius *= float(np.linalg.norm(matrix[:3, 0]))
     closed = job.eye is None or bool(np.linalg.norm(job.eye - center) > radius)
-    material, emission = _appearance(node, job, closed)
+    material, emission = _appearance(node, job, closed and not inward)
     turn = None
     textured = bool(textures_in((material, emission), Texture))
     if textured or _has_grain(material):
         material, emission = _for_spheres(material, emission, job)
         left, _, right = np.linalg.svd(matrix[:3, :3])
         turn = left @ right @ POLES
-        if np.linalg.det(turn) < 0:
-            if textured:
-                node.lose("the reflection of its textures")
-            turn = -turn
-    name = node.id or "sphere"
-    return [Sphere(center, radius, material=material, emission=emission, transform=turn, name=name)]
+    improper = turn is not None and mirrored
+    made = Sphere(
+        center,
+        radius,
+        material=material,
+        emission=emission,
+        transform=None if improper else turn,
+        name=node.id or "sphere",
+    )
+    if not (inward or improper or (emission is not None and material.opacity is not None)):
+        return [made]
+    raw = facing(ball(made, turn), reverse=inward)
+    raw = replace(raw, name=made.name, material=material, emission=emission)
+    mesh = build(job.name, raw, job.files.losses)
+    return [] if mesh is None else [mesh]
 
 
 @plugin("obj ply", "shape", f"{SURFACE} filename face_normals flip_tex_coords", PARTS)
@@ -240,16 +251,9 @@ def angle_normals(vertices: Doubles, faces: Ints) -> Doubles:
 
 
 def _with_coordinates(raw: RawMesh) -> RawMesh:
-    """Return a mesh with the coordinates and the tangents that Mitsuba gives one without uv."""
-    corners = raw.vertices[np.clip(raw.faces, 0, len(raw.vertices) - 1)]
-    flat = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-    flat[~(np.abs(flat).max(1) > 0)] = (0, 0, 1)  # of faces without an area, which are left out
+    """Return a mesh with the coordinates that Mitsuba gives one without uv: u is 1 at the second corner."""
     apart = with_corners_apart(raw)
-    if apart.normals is None:
-        apart.normals = np.repeat(flat, 3, 0)
-    along = np.array([frame(axis)[:, 0] for axis in flat])
-    apart.tangents = np.hstack([np.repeat(along, 3, 0), np.ones((len(apart.vertices), 1))])
-    apart.uvs = np.tile([[0.0, 0], [1, 0], [0, 1]], (len(flat), 1))
+    apart.uvs = np.tile([[0.0, 0], [1, 0], [0, 1]], (len(raw.faces), 1))
     return apart
 
 
@@ -285,7 +289,7 @@ def _appearance(node: Node, job: Job, closed: bool = False) -> tuple[Material, A
         material = job.changed(material, alpha=alpha)
     if interior is not None:
         material = job.changed(material, interior=interior)
-    if one_sided and not closed:
+    if one_sided and not (closed and material.alpha is None):
         bsdf = job.once((id(material.bsdf), Sides), lambda: Sides(material.bsdf))
         material = job.changed(material, bsdf=bsdf)
     if emitters and job.hides_lamps:
