@@ -169,6 +169,15 @@ def test_normals_of_files_weigh_by_angle_alone(tmp_path: Path) -> None:
     assert len(mesh.vertices) == 4
 
 
+def test_normals_that_face_away_from_the_viewer_are_black(tmp_path: Path) -> None:
+    """As in Mitsuba, where the side that is seen is that of the shading normals."""
+    (tmp_path / "a.obj").write_text(OBJ)
+    made = shape("obj", filename=str(tmp_path / "a.obj")).material.bsdf
+    bound = made.bind(SimpleNamespace(back_facing=np.zeros(2, np.bool_)))
+    wo, wi = np.array([[0, 0], [1, 1], [0.002, 0.01]], np.float32), np.eye(3, dtype=np.float32)[:, [2, 2]]
+    assert (bound.evaluate(wo, wi)[0][0] > 0).tolist() == [False, True]
+
+
 def test_grain_runs_around_the_axis_of_a_sphere_and_a_cylinder() -> None:
     grain = {"type": "roughconductor", "alpha_u": 0.05, "alpha_v": 0.4}
     ball = shape("sphere", bsdf=grain, to_world=TURN)

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from ...arrays.state import SurfaceInteraction
-from ...arrays.vec import Floats, Ints, cross, dot, f4, normalize
+from ...arrays.vec import Bools, Floats, Ints, cross, dot, f4, normalize
 from ...bsdfs import (
     Bsdf,
     Conductor,
@@ -33,6 +33,7 @@ from .nodes import Job, Node, plugin, unsupported
 from .textures import as_color, bitmap, color, roughness, scalar
 
 LEAST_INDEX = 1e-6
+BENT = 3e-3  # a little more than the cosine to which such normals are bent
 HALF = "a pane that lets half of the light through"
 MAPPED = "use_shadowing_function flip_invalid_normals"
 # the back is black
@@ -51,6 +52,16 @@ class ShadingFrameMap(NormalMap):
         normal, along = normal.take(lanes, 1), along.take(lanes, 1)
         tangent = normalize(along - normal * dot(along, normal))
         return lanes, normalize(tangent * x + cross(normal, tangent) * y + normal * z)
+
+
+class FacingSides(Sides):
+    """A surface that is black on its back, and where its shading normals face away from the viewer.
+
+    Elsewhere such normals are bent towards the viewer.
+    """
+
+    def _back_of(self, wo: Floats) -> Bools:
+        return super()._back_of(wo) | (wo[2] < BENT)
 
 
 def _named(node: Node, bsdf: Bsdf) -> Material:

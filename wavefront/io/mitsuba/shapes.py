@@ -28,7 +28,7 @@ from ..repair import RawMesh, build, with_corners_apart
 from ..surfaces import as_meshes, ball
 from ..volumes import parsed_grid
 from .attributes import with_attribute
-from .bsdfs import is_one_sided
+from .bsdfs import FacingSides, is_one_sided
 from .media import interior_of
 from .nodes import PLUGINS, Job, Node, plugin, unsupported
 from .serialized import read_serialized
@@ -212,7 +212,7 @@ def _mesh(node: Node, job: Job, raw: RawMesh, of_file: bool = False, closed: boo
         normals = None if raw.normals is None else -raw.normals
         raw = replace(raw, faces=raw.faces[:, ::-1], normals=normals)
     job.count(raw.faces)
-    material, emission = _appearance(node, job, closed)
+    material, emission = _appearance(node, job, closed, of_file and raw.normals is not None)
     if raw.uvs is None and {"uv", "tangent_frame"} & _reads((material, emission)):
         raw = _with_coordinates(raw)
     name = node.id or raw.name
@@ -268,8 +268,8 @@ def _has_grain(material: Material) -> bool:
     return "tangent_frame" in _reads(material)
 
 
-def _appearance(node: Node, job: Job, closed: bool = False) -> tuple[Material, Any]:
-    """Return the material and the emission of a shape."""
+def _appearance(node: Node, job: Job, closed: bool = False, bent: bool = False) -> tuple[Material, Any]:
+    """Return the material and the emission of a shape; `bent` where it has normals other than its own."""
     bsdfs, emitters = node.held("bsdf"), node.held("emitter")
     for extra in (*bsdfs[1:], *emitters[1:]):
         node.lose(f"a second {extra.kind}")
@@ -290,7 +290,8 @@ def _appearance(node: Node, job: Job, closed: bool = False) -> tuple[Material, A
     if interior is not None:
         material = job.changed(material, interior=interior)
     if one_sided and not (closed and material.alpha is None):
-        bsdf = job.once((id(material.bsdf), Sides), lambda: Sides(material.bsdf))
+        kind = FacingSides if bent else Sides
+        bsdf = job.once((id(material.bsdf), kind), lambda: kind(material.bsdf))
         material = job.changed(material, bsdf=bsdf)
     if emitters and job.hides_lamps:
         material = job.changed(material, visible_to_camera=False)
