@@ -173,7 +173,7 @@ def test_normals_that_face_away_from_the_viewer_are_black(tmp_path: Path) -> Non
     """As in Mitsuba, where the side that is seen is that of the shading normals."""
     (tmp_path / "a.obj").write_text(OBJ)
     made = shape("obj", filename=str(tmp_path / "a.obj")).material.bsdf
-    bound = made.bind(SimpleNamespace(back_facing=np.zeros(2, np.bool_)))
+    bound = made.bind(SimpleNamespace(back_facing=np.zeros(2, np.bool_), index_around=None))
     wo, wi = np.array([[0, 0], [1, 1], [0.002, 0.01]], np.float32), np.eye(3, dtype=np.float32)[:, [2, 2]]
     assert (bound.evaluate(wo, wi)[0][0] > 0).tolist() == [False, True]
 
