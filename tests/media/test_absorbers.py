@@ -408,6 +408,26 @@ def test_a_caustic_by_a_point_light_is_dimmed(medium) -> None:
     assert_same_images(straight, from_lights, 0.02)
 
 
+@pytest.mark.parametrize("caustics", [False, True])
+@pytest.mark.parametrize("accel", ["numpy", "embree"])
+def test_backgrounds_and_catchers_behind_mirrored_instances(accel: str, caustics: bool) -> None:
+    """A white background arrives by exp(−σ); a shadow covers 1 − exp(−σ), both through water 1 thick."""
+    options = {"accel": _available(accel), "caustics": caustics}
+    sigma = np.array([0.3, 1.0, 2.0])
+    slab = wf.Box((0, 0, 0), (2, 2, 1), material=water(sigma))
+    glass = wf.Sphere((0, 3, 0), 0.3, material=wf.Dielectric(1.5))
+    parts = [*instanced([slab]), glass, wf.PointLight((0, 4, 4), 1)]
+    image = render(scene_of(parts, probe((0, 0, 0), (0.0, 0.0, 5.0))), 1, background=(1, 1, 1), **options)
+    np.testing.assert_allclose(image.rgb[0, 0], np.exp(-sigma), rtol=1e-4)
+    assert image.alpha == pytest.approx(1 - np.exp(-sigma).mean(), rel=1e-4)
+    smoke = wf.Box((0, 0, 0), (2, 2, 1), material=water(0.99))
+    catcher = wf.Rectangle((-3, -3, -2), (6, 0, 0), (0, 6, 0), material=wf.ShadowCatcher())
+    camera = wf.Camera.look_at((0.3, 0, -1), (0.3, 0, -2), up=(0, 1, 0), fov=1, size=(4, 4))
+    parts = [*instanced([smoke]), catcher, glass, wf.DirectionalLight((0, 0, -1), 1)]
+    shadow = render(scene_of(parts, camera), 64, background="transparent", **options)
+    assert shadow.alpha.mean() == pytest.approx(1 - np.exp(-0.99), rel=0.01)
+
+
 # --- Forty random scenes ---------------------------------------------------------------------------------
 
 
