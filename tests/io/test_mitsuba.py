@@ -1220,6 +1220,13 @@ def test_one_warning_names_plugin_id_and_parameter() -> None:
         ({"ball": {"type": "sphere", "e": {"type": "point"}}}, "which is no area light"),
         ({"s": {"type": "perspective", "fov": 60, "focal_length": "35mm"}}, "give one of them"),
         ({"s": {"type": "perspective", "film": {"type": "hdrfilm", "width": 0}}}, "width is 0"),
+        ({"s": {"type": "perspective", "fov": 180.0}}, r"fov is 180\.0.*39\.6 in its place"),
+        (
+            {"s": {"type": "perspective", "film": {"type": "hdrfilm", "crop_width": 999}}},
+            "the crop .* outside",
+        ),
+        ({"a": {"type": "constant"}, "b": {"type": "constant"}}, "1 further light from all around; left out"),
+        ({"ball": {"type": "cube", "interior": {"type": "homogeneous", "albedo": 1.5}}}, "clamped to 1"),
         ({"i": {"type": "path", "max_depth": -5}}, "max_depth is -5"),
         ({"i": {"type": "instance", "group": {"type": "cube"}}}, "it must be a shapegroup"),
         ({"i": {"type": "instance"}}, "holds no shape"),

@@ -260,6 +260,43 @@ def test_light_from_far_away_alone_is_a_scene(tmp_path: Path) -> None:
     np.testing.assert_allclose(image.rgb, np.broadcast_to([1, 0.5, 0.25], (4, 4, 3)))
 
 
+def test_lights_from_far_away_are_added(tmp_path: Path) -> None:
+    one, two = 'LightSource "infinite" "rgb L" [ 1 .5 .25 ] ', 'LightSource "infinite" "rgb L" [ 1 1 1 ]'
+    (light,) = load(tmp_path, one + two + BALL).lights
+    assert light.radiance.ravel().tolist() == [2, 1.5, 1.25]
+    write_image(tmp_path / "e.exr", np.ones((2, 2, 3), np.float32))
+    with pytest.warns(UserWarning, match="1 further light from all around; left out"):
+        scene = load(tmp_path, f'LightSource "infinite" "string filename" "e.exr" {one} {BALL}', strict=False)
+    assert len(scene.lights) == 1
+
+
+@pytest.mark.parametrize(
+    ("header", "body", "message"),
+    [
+        ('Camera "fisheye"', "", "no such camera; 'perspective' in its place"),
+        (
+            'Camera "perspective" "float shutteropen" 1',
+            "",
+            "is open for 0; it must be above 0; 1 in its place",
+        ),
+        ('Film "rgb" "integer pixelbounds" [ 9 5 0 5 ] Camera "perspective"', "", "its pixels end before"),
+        ("", 'Material "conductor" "float roughness" -1', "roughness is -1; clamped to 0"),
+        (
+            "",
+            'MakeNamedMaterial "a" "string type" "diffuse" Material "mix" "string materials" "a"',
+            "it needs two",
+        ),
+        ("", "WorldEnd", "'WorldEnd'; it is one of pbrt-v3"),
+        ("", 'Shape "sphere" "float radius" 1e300', "radius is 1e.300; it must be above 0"),
+    ],
+)
+def test_what_stands_for_a_damaged_part(tmp_path: Path, header: str, body: str, message: str) -> None:
+    with pytest.warns(UserWarning, match=message):
+        scene = load(tmp_path, f"{body} {BALL}", header, strict=False)
+    assert isinstance(scene.shapes[-1], wf.Sphere)
+    assert "Camera" not in header or scene.camera is not None
+
+
 def test_a_material_without_a_name_is_an_interface(tmp_path: Path) -> None:
     (ball,) = load(tmp_path, f'Material "" {BALL}').shapes
     assert ball.material.bsdf.invisible

@@ -14,6 +14,7 @@ import numpy as np
 from ..arrays.vec import Doubles
 from ..bsdfs import Diffuse, Measured, NullSurface
 from ..core.errors import LimitError, SceneError, exact, finite_array, in_brief, number, one_of
+from ..core.plural import plural
 from ..lights import Environment, Light, Sky
 from ..materials import Material
 from ..media import Isotropic
@@ -257,6 +258,15 @@ class Conversion(Generic[P]):
         most = self.files.limits.instances
         if self.instances > most:
             raise LimitError(f"there are more than {most} instances; the limit is LoadLimits.instances")
+
+
+def only_one(lights: Sequence[Light], losses: Losses) -> list[Light]:
+    """Return lights with the first `Environment` alone; others are noted."""
+    around = [light for light in lights if isinstance(light, Environment)]
+    if len(around) > 1:
+        found = plural(len(around) - 1, "further light from all around", "further lights from all around")
+        losses.note(found, done="left out")
+    return [light for light in lights if light not in around[1:]]
 
 
 def shown(shapes: list[Shape], lights: Sequence[Light], losses: Losses) -> list[Shape]:

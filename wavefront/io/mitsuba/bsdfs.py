@@ -78,7 +78,7 @@ def _named(node: Node, bsdf: Bsdf) -> Material:
 def _conductor(node: Node, job: Job) -> Material:
     facets = _facets(node, job) if node.plugin == "roughconductor" else {}
     tint = color(node, "specular_reflectance", 1.0, job)
-    name = node.text("material", "none")
+    name = node.or_default("none", lambda: _metal(node))
     if "eta" in node.values or name == "none":
         if node.plugin == "conductor" and "eta" not in node.values:
             return _named(node, Mirror(tint))
@@ -87,11 +87,18 @@ def _conductor(node: Node, job: Job) -> Material:
         k = k if isinstance(k, BaseTexture) else np.maximum(k, 0)
     else:
         base = name.removesuffix("_palik") if name not in METALS else name
-        eta, k = METALS[one_of("material", base, METALS)]
+        eta, k = METALS[base]
         if base != name:
             node.lose(f"material {name!r}; {base!r} in its place")
         eta = np.maximum(eta, LEAST_INDEX)
     return _named(node, Conductor(eta, k, reflectance=tint, **facets))
+
+
+def _metal(node: Node) -> str:
+    """Return the name of the metal, which may be none."""
+    name = node.text("material", "none")
+    base = name.removesuffix("_palik") if name not in METALS else name
+    return name if base in METALS else str(one_of("material", name, ("none", *METALS)))
 
 
 @plugin("twosided", "bsdf", holds="bsdf", harmless="allow_transmission")
@@ -319,7 +326,8 @@ def is_one_sided(node: Node) -> bool:
     if node.plugin in ("mask", "bumpmap", "normalmap", "blendbsdf"):
         return all(is_one_sided(part) for part in node.held("bsdf"))
     if node.plugin == "principled":
-        return node.values.get("spec_trans", 0.0) == 0.0
+        passing = node.values.get("spec_trans", 0.0)
+        return isinstance(passing, int | float) and passing == 0
     return node.plugin in ONE_SIDED
 
 

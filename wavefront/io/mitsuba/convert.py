@@ -9,7 +9,7 @@ from typing import Any
 from ...camera import Sensors, SurfaceSensors
 from ...lights import Environment, Sky
 from ...scene import Scene
-from ..conversion import shown
+from ..conversion import only_one, shown
 from ..repair import RawMesh
 from ..sources import SceneFiles
 from . import bsdfs, emitters, shapes, textures  # noqa: F401  they fill the table
@@ -78,6 +78,7 @@ def _scene(node: Node, job: Job) -> Scene:
     lamps = [part for part in node.held("emitter") if part.plugin != "area"]
     made = [light for part in lamps if (light := job.convert(part)) is not None]
     lights = [light for each in made for light in (each if isinstance(each, list) else [each])]
+    lights = only_one(lights, job.files.losses)
     found = shown(found, lights, job.files.losses)
     settings = settings | followed
     if measures or (not hides and any(isinstance(light, Environment | Sky) for light in lights)):

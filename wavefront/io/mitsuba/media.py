@@ -54,6 +54,8 @@ def coefficient(node: Node, name: str, default: float, job: Job) -> Doubles:
         value = None if value.plugin == "gridvolume" else job.convert(value)
     else:
         value = color(node, name, default, job, "unbounded")
+        if not isinstance(value, BaseTexture):
+            value = node.lost.within(name, value, 0.0, 1.0 if name == "albedo" else np.inf, node.label)
     if value is None or isinstance(value, BaseTexture):
         node.lose(name)
         value = default

@@ -21,6 +21,7 @@ Crop = tuple[int, int, int, int] | None
 MOST_CHECKED = 1 << 16  # points of a shape that are compared with the planes of a sensor
 USUAL = {"filter": GaussianFilter(2.0, windowed=True)}  # where a film has no filter
 DEFAULT_FILM = ((768, 576), None, USUAL)
+USUAL_FOV = 39.6  # degrees, of 36 mm at 50 mm
 ENDLESS = 2**16  # bounces, where there is no limit
 CLIPPED = "to_world near_clip far_clip"
 NO_CLIPPING = "near_clip and far_clip do not cut; named where they would"
@@ -107,6 +108,12 @@ def _film(node: Node, job: Job) -> tuple[tuple[int, int], Crop, Settings]:
     width, height = node.whole("width", 768, 1), node.whole("height", 576, 1)
     left, top = node.whole("crop_offset_x", 0), node.whole("crop_offset_y", 0)
     right, bottom = left + node.whole("crop_width", width, 1), top + node.whole("crop_height", height, 1)
+    if not (left < width and top < height and right <= width and bottom <= height):
+        node.lose(
+            f"the crop {[left, top, right, bottom]}, where it is outside of its {width} × {height} pixels"
+        )
+        left, top = (left, top) if left < width and top < height else (0, 0)
+        right, bottom = min(right, width), min(bottom, height)
     whole = (left, top, right, bottom) == (0, 0, width, height)
     filters = node.held("rfilter")
     settings = dict(job.convert(filters[0]) if filters else USUAL)
@@ -220,7 +227,7 @@ def _field_of_view(node: Node, aspect: float) -> float:
     if "fov" in node.values:
         if "focal_length" in node.values:
             node.lose("has fov and focal_length; give one of them; fov counts")
-        angle = node.number("fov", 0, lambda x: 0 < x < 180, "above 0 and below 180 degrees")
+        angle = node.number("fov", USUAL_FOV, lambda x: 0 < x < 180, "above 0 and below 180 degrees")
         axis = node.choice("fov_axis", "x", ("x", "y", "diagonal", "smaller", "larger"))
     else:
         (length,) = numbers("", "focal_length", node.text("focal_length", "50mm").removesuffix("mm"), (1,))

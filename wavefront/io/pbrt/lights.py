@@ -11,9 +11,12 @@ from ...arrays.vec import Doubles, Floats, luminance, spans
 from ...codecs.encoding import codes_to_linear
 from ...codecs.luminaires import Photometry
 from ...core.errors import SceneError
-from ...lights import DirectionalLight, Environment, PointLight, Projector, SpotLight
+from ...lights import DirectionalLight, Environment, Light, PointLight, Projector, SpotLight
+from ...lights.environment import ConstantEnvironment
 from ...lights.ies import Web, WebLight
 from ...textures.image import Texture
+from ..conversion import only_one
+from ..losses import Losses
 from ..mitsuba.views import angle_of, half_tangent
 from .entities import Entity, Job, converts
 
@@ -127,6 +130,16 @@ def _infinite(entity: Entity, job: Job) -> Environment:
         raise SceneError(f"the transform of its directions is singular: {axes.tolist()}")
     to_light = np.asarray(np.linalg.inv(axes), np.float64)
     return Environment(_by_longitude(pixels, to_light) * np.float32(factor))
+
+
+def summed(lights: list[Light], losses: Losses) -> list[Light]:
+    """Return lights with one `Environment`: those of one color are added, of images the first one counts."""
+    around = [each for each in lights if isinstance(each, Environment)]
+    even = [each for each in around if isinstance(each.record(np.zeros(3)), ConstantEnvironment)]
+    if len(even) > 1:
+        total = Environment(np.sum([each.radiance[:, 0] for each in even], 0))
+        lights = [total, *(each for each in lights if each not in even)]
+    return only_one(lights, losses)
 
 
 @converts("area light", "diffuse")

@@ -23,7 +23,7 @@ from ...bsdfs import (
     ThinDielectric,
 )
 from ...bsdfs.fresnel import fresnel_dielectric
-from ...core.errors import SceneError, number
+from ...core.errors import SceneError
 from ...materials import Material
 from ...media import GridMedium, HenyeyGreenstein, Medium
 from ...textures.base import BaseTexture
@@ -48,9 +48,12 @@ def _roughness(entity: Entity, job: Job, prefix: str = "") -> dict[str, Value]:
     names = [f"{prefix}{axis}roughness" for axis in ("u", "v")]
     base = scalar(entity, f"{prefix}roughness", 0.0, job)
     u, v = (scalar(entity, name, 0.0, job) if name in entity.values else base for name in names)
-    for value in (u, v):
-        if not isinstance(value, BaseTexture):
-            number("roughness", value, lambda x: x >= 0, "at least 0")
+    u, v = (
+        value
+        if isinstance(value, BaseTexture)
+        else float(entity.lost.within(f"{prefix}roughness", value, 0, np.inf, entity.label))
+        for value in (u, v)
+    )
     if u is v or (not isinstance(u, BaseTexture) and u == v):
         return {"roughness": computed(root, u)}
     return {"roughness": computed(root, u), "roughness_v": computed(root, v)}
@@ -191,10 +194,16 @@ def _diffuse_transmission(entity: Entity, job: Job) -> DiffuseTransmission:
 
 @_surface("mix")
 def _mix(entity: Entity, job: Job) -> Mix:
-    names = entity.get("materials", ("string",)) or []
-    if len(names) != 2:
-        raise SceneError(f"materials names {len(names)} materials; it needs two")
-    first, second = (job.convert(job.refer("material", name)) for name in names)
+    names, found = entity.get("materials", ("string",)) or [], list[Material]()
+    for name in names[:2]:
+        with entity.lost.part(entity.label):
+            found.append(job.convert(job.refer("material", name)))
+    if len(found) == 1:
+        entity.lose(f"{names} has one material that there is; it needs two")
+        found *= 2
+    if len(found) != 2:
+        raise SceneError(f"materials names {len(names)} materials; it needs two that there are")
+    first, second = found
     if first.bsdf.invisible or second.bsdf.invisible:
         raise SceneError("materials has an 'interface'; it cannot be mixed")
     if first.normal_map is not None or second.normal_map is not None:

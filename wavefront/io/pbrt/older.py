@@ -24,6 +24,7 @@ OLDER: dict[tuple[str, str], tuple[str | None, dict[str, str]]] = {
     ("material", "kdsubsurface"): ("diffuse", {"Kd": "reflectance"}),
     ("material", "fourier"): ("diffuse", {}),
     ("film", "image"): ("rgb", {}),
+    ("camera", "environment"): ("spherical", {}),
     ("area light", "area"): ("diffuse", {}),
     **{
         ("sampler", name): ("independent", {})
@@ -45,6 +46,9 @@ def upgrade(entity: Entity) -> None:
     elif kind == "material" and (kind, entity.type) not in TABLE and given is not None:
         entity.lose("pbrt has no such material; a diffuse surface of its color in its place")
         nearest, names = "diffuse", {given: "reflectance"}
+    elif kind == "camera" and (kind, entity.type) not in TABLE:
+        entity.lose("pbrt has no such camera; 'perspective' in its place")
+        nearest = "perspective"
     elif kind == "light" and "mapname" in entity.values:
         entity.lose("mapname is of pbrt-v3, and this reads pbrt-v4; as filename")
         names = {"mapname": "filename"}

@@ -38,6 +38,7 @@ STATEMENTS = {
 }
 V2 = ("SurfaceIntegrator", "VolumeIntegrator", "Renderer", "Volume", "VolumeRegion")
 OLD = dict.fromkeys(V2, "; it is one of pbrt-v2, and this reads pbrt-v4")
+OLD["WorldEnd"] = "; it is one of pbrt-v3, and this reads pbrt-v4"
 BLANK = re.compile(r"(?:[ \t\r\n]++|#[^\r\n]*+)*+")
 TOKEN = re.compile(r'"(?:[^"\\\n]|\\.)*+"|[\[\]]|[^\s"\[\]]++')
 LIST = re.compile(r"\[([-+.\deE\s]*+)\]")  # of numbers alone, the common case of long ones

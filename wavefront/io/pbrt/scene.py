@@ -113,6 +113,7 @@ class Reader:
         for name, matrices in self.uses.items():
             found += place_object(self.objects[name], job, np.array(matrices))
         lamps = [light for entity in self.lights if (light := job.convert(entity)) is not None]
+        lamps = lights.summed(lamps, job.files.losses)
         view = None if camera is None else job.convert(camera)
         return Scene(shown(found, lamps, job.files.losses), lamps, view, settings=settings, medium=job.around)
 

@@ -205,7 +205,7 @@ def _exact_sphere(entity: Entity, job: Job, matrix: Matrix, light: Entity | None
     alpha = _opacity(entity, light, job)
     radius = _radius(entity) * float(np.linalg.svd(matrix[:3, :3], compute_uv=False)[0])
     material = material_of(entity.state, alpha, job, entity)
-    emission, _ = _emission(light, 4 * np.pi * radius**2, job)
+    emission, _ = _emission(light, 4 * np.pi * radius * radius, job)
     if textures_in((material, emission)):
         return None
     return Sphere(matrix[:3, 3], radius, material=material, emission=emission)

@@ -97,7 +97,8 @@ def exposure_of(film: Entity | None, camera: Entity | None) -> float:
     if camera is not None:
         time = camera.number("shutterclose", 1.0) - camera.number("shutteropen", 0.0)
         if not time > 0:
-            raise SceneError(f"{camera.label}: is open for {exact(time)}; it must be above 0")
+            camera.lose(f"is open for {exact(time)}; it must be above 0; 1 in its place")
+            time = 1.0
     return time * (1.0 if film is None else film.number("iso", 100.0, lambda x: x > 0, "above 0") / 100)
 
 
@@ -111,17 +112,17 @@ def _film(entity: Entity, job: Job) -> tuple[tuple[int, int], tuple[int, ...] | 
     bounds, window = (entity.array(name, (kind,)) for name, kind in _CROPS)
     if window is not None:
         if len(window) != 4:
-            raise SceneError(f"cropwindow has {len(window)} numbers; it must have 4")
+            entity.lose(f"cropwindow has {len(window)} numbers; it must have 4; left out")
+            return size, None
         x, y = (np.ceil(np.clip(np.sort(window[i : i + 2]), 0, 1) * size[i // 2]) for i in (0, 2))
         bounds = np.concatenate([x, y])
     if bounds is None:
         return size, None
-    if len(bounds) != 4:
-        raise SceneError(f"pixelbounds has {len(bounds)} numbers; it must have 4")
-    left, right, top, bottom = (int(each) for each in bounds)
+    left, right, top, bottom = (int(each) for each in np.resize(bounds, 4))
     crop = (max(left, 0), max(top, 0), min(right, size[0]), min(bottom, size[1]))
-    if crop[0] >= crop[2] or crop[1] >= crop[3]:
-        raise SceneError(f"its pixels end before they begin: {[left, right, top, bottom]}")
+    if len(bounds) != 4 or crop[0] >= crop[2] or crop[1] >= crop[3]:
+        entity.lose(f"its pixels end before they begin: {bounds.tolist()}; all of them in their place")
+        return size, None
     return size, None if crop == (0, 0, *size) else crop
 
 
