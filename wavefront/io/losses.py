@@ -70,6 +70,7 @@ class Losses:
     def __init__(self, name: str, strict: bool = False) -> None:
         self.name, self.strict = name, strict
         self._noted: dict[Loss, None] = {}
+        self._notices: dict[Loss, None] = {}
 
     def note(self, part: str, place: str = "", value: str = "", done: str = NOT_HONORED) -> None:
         """Note a part that is left out, or replaced.
@@ -87,6 +88,14 @@ class Losses:
         """
         where = place if place.startswith(self.name) else f"{self.name}: {place}" if place else self.name
         self._noted[Loss(where, part, value, done)] = None
+
+    def notice(self, part: str, place: str, done: str) -> None:
+        """Note what may surprise, but is shown as the file says: `strict` is no error of it.
+
+        The arguments are those of `note`; several places with the same part count as one.
+        """
+        if not self.strict and all((each.part, each.done) != (part, done) for each in self._notices):
+            self._notices[Loss(f"{self.name}: {place}", part, done=done)] = None
 
     def hear(self, message: str) -> None:
         """Note a warning that begins with its place."""
@@ -120,9 +129,15 @@ class Losses:
             self.note(part, place, _text(given), f"clamped to {_text(limited)}")
         return limited
 
-    def take(self, losses: Iterable[Loss]) -> None:
+    def take(self, losses: Iterable[Loss], notices: Iterable[Loss] = ()) -> None:
         """Note what another list of the same file has."""
         self._noted.update(dict.fromkeys(losses))
+        self._notices.update({} if self.strict else dict.fromkeys(notices))
+
+    @property
+    def notices(self) -> tuple[Loss, ...]:
+        """All of which `strict` is no error."""
+        return tuple(self._notices)
 
     @property
     def found(self) -> tuple[Loss, ...]:
@@ -143,7 +158,7 @@ class Losses:
         """
         if self._noted and self.strict:
             raise SceneError(self._message())
-        if self._noted:
+        if self._noted or self._notices:
             warn_caller(self._message())
 
     def _message(self, what: str = "") -> str:
@@ -157,7 +172,7 @@ class Losses:
     def _lines(self) -> list[str]:
         """Return what was noted as text; the same at several places is one line with their number."""
         alike: dict[tuple[str, str, str], list[Loss]] = {}
-        for loss in self._noted:
+        for loss in (*self._noted, *self._notices):
             alike.setdefault((loss.part, loss.value, loss.done), []).append(loss)
         return [
             first.said(self.name) + (f" ({len(more)} more)" if more else "")

@@ -9,6 +9,7 @@ import numpy as np
 
 from ..arrays.vec import Bools, Ints
 from ..core.errors import LimitError, SceneError
+from ..materials import Material
 from ..shapes import Instance, Mesh
 from ..shapes.instance import can_place
 from ..shapes.transform import Matrix, moved, moved_tangents
@@ -28,6 +29,7 @@ class Places:
     matrix: Matrix = field(default_factory=lambda: np.zeros((0, 4, 4)))  # (n, 4, 4) to the scene
     # (n,) of the placed shapes, "" for that of the mesh; None for all of these
     names: list[str] | None = None
+    materials: list[Material | None] | None = None  # the same, in place of those of the meshes
 
     @classmethod
     def once(cls, count: int) -> Places:
@@ -96,6 +98,9 @@ def place_shapes(name: str, raws: list[RawMesh], places: Places, losses: Losses)
     for shape, own in zip(shapes, places.names or (), strict=False):
         if shape is not None and own:
             shape.name = own
+    for shape, made_of in zip(shapes, places.materials or (), strict=False):
+        if shape is not None and made_of is not None:
+            shape.material = made_of
     return [shape for shape in shapes if shape is not None]
 
 

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import os
 import re
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -168,13 +170,36 @@ class Layers:
                     raise LimitError(f"{path}: is beyond the limit of {most} prims for files of this size")
 
 
-def said(error: Any) -> str:
-    """Return the message of an error of usd-core on one line; it may have bytes that are not UTF-8."""
+@contextmanager
+def typed(what: str) -> Iterator[None]:
+    """Raise a SceneError in place of what usd-core, or a value of an odd type, raises.
+
+    Parameters
+    ----------
+    what
+        The beginning of its message.
+    """
     try:
-        text = str(error)
+        yield
+    except (SceneError, MemoryError):
+        raise
+    except Exception as error:  # of pxr.Tf, and of any type where values are of others than the schema has
+        if "bad_alloc" in _text(error):
+            raise LimitError(f"{what}: it takes more memory than LoadLimits.memory_bytes") from error
+        raise SceneError(f"{what}: {said(error)}") from error
+
+
+def said(error: Any) -> str:
+    """Return the message of an error of usd-core on one line."""
+    return WHERE.sub("", " ".join(_text(error).split()))[:MOST_SAID]
+
+
+def _text(error: Any) -> str:
+    """Return the message of an error; that of usd-core may have bytes that are not UTF-8."""
+    try:
+        return str(error)
     except UnicodeDecodeError as wrong:
-        text = wrong.object.decode("utf-8", errors="replace")
-    return WHERE.sub("", " ".join(text.split()))[:MOST_SAID]
+        return wrong.object.decode("utf-8", errors="replace")
 
 
 def _file_of(layer: Any) -> str:

@@ -3,18 +3,23 @@
 from __future__ import annotations
 
 import math
+from copy import copy
 from typing import Any
 
 import numpy as np
 
 from ...arrays.vec import Doubles, luminance
+from ...bsdfs import Diffuse
 from ...colors.spectrum import blackbody
 from ...lights import DirectionalLight, Environment, Light, PointLight, SpotLight
+from ...materials import Material
+from ...scene.loss import NOT_HONORED
 from ...shapes import Disk, Rectangle, Shape, Sphere
 from ...shapes.transform import Matrix
 from ...textures import Texture
+from ...textures.base import BaseTexture
 from ..placing import moved_raw
-from ..repair import build
+from ..repair import RawMesh, build
 from ..sources import GRAY
 from ..surfaces import revolved, slope
 from .gprims import along
@@ -23,6 +28,10 @@ from .values import check_even, mean_scale, value_of
 
 PLAIN: dict[str, Any] = {"inputs:diffuse": 1.0, "inputs:specular": 1.0, "inputs:shaping:focus": 0.0}
 PLAIN |= {"inputs:shaping:ies:file": None}  # by their values where they change nothing
+
+LEAST = 1e-3  # meters, in place of a size of 0
+TINTED = "materialGlowTintsLight"  # what the emission of a material does to the light of its mesh
+BLACK = Material(Diffuse(0.0))
 
 
 class Lamp:
@@ -47,15 +56,24 @@ class Lamp:
 
     def light(self) -> Light | Shape | None:
         """Return the light, or a shape that emits it."""
+        self.plain_inputs()
+        make, *sizes = LAMPS[str(self.prim.GetTypeName())]
+        for name in sizes:
+            if self.of(name, 1.0) == 0 and not self.of("normalize", False):
+                self.lose(f"inputs:{name} is 0 and gives no light", "left out")
+                return None
+        made: Light | Shape | None = make(self)
+        return made
+
+    def plain_inputs(self) -> None:
+        """Note inputs that are not honored."""
         for name, usual in PLAIN.items():
             if value_of(self.prim, self.materials.time, name, usual) != usual:
                 self.lose(name)
-        made: Light | Shape | None = LAMPS[str(self.prim.GetTypeName())](self)
-        return made
 
-    def lose(self, what: str) -> None:
+    def lose(self, what: str, done: str = NOT_HONORED) -> None:
         """Note what is not honored."""
-        self.materials.lose(self.prim, what)
+        self.materials.lose(self.prim, what, done)
 
     def of(self, name: str, default: Any) -> Any:
         """Return an input."""
@@ -70,14 +88,25 @@ class Lamp:
         scale = mean_scale(self.matrix) if axis is None else self.scale[axis]
         return float(self.of(name, default)) * float(scale)
 
+    def size(self, name: str, default: float, axis: int | None = None) -> float:
+        """Return such a length; a small one in place of 0, through which the power of `normalize` passes."""
+        length = self.length(name, default, axis)
+        if length == 0:
+            self.lose(f"inputs:{name} is 0", f"{LEAST:g} meters in its place")
+        return length or LEAST
+
     def strength(self, area: float = 1.0) -> Doubles:
         """Return the radiance (3,), which `normalize` divides by the area, in the scene's units."""
+        return self.color() / (area / self.unit**2 if self.of("normalize", False) else 1.0)
+
+    def color(self) -> Doubles:
+        """Return the radiance (3,) without `normalize`."""
         color = np.asarray(self.of("color", (1, 1, 1)), float) * float(self.of("intensity", 1.0))
         color = color * 2.0 ** float(self.of("exposure", 0.0))
         if self.of("enableColorTemperature", False):
             white = blackbody(float(self.of("colorTemperature", 6500.0)))
             color = color * (white / luminance(white))
-        return color / (area / self.unit**2) if self.of("normalize", False) else color
+        return color
 
     @property
     def cone(self) -> float:
@@ -112,13 +141,15 @@ def _dome(lamp: Lamp) -> Light:
 def _ball(lamp: Lamp) -> Light | Shape:
     check_even(lamp.matrix, lamp.lose)
     lamp.plain(cone=False)
-    radius, point = lamp.length("radius", 0.5), lamp.flag("treatAsPoint")
-    glow = lamp.strength(4 * math.pi * radius**2)
+    radius = lamp.length("radius", 0.5)
+    point = radius == 0 or lamp.flag("treatAsPoint")
     if not point and lamp.cone >= 90:
+        glow = lamp.strength(4 * math.pi * radius**2)
         return Sphere(lamp.center, radius, emission=glow, name=lamp.name)
     if not point:
         lamp.lose("its radius; a SpotLight in its place")
-    intensity = glow * (math.pi * radius**2)
+    # the radiance times π radius²; `normalize` divides it by the area, of which that is a fourth
+    intensity = lamp.color() * (lamp.unit**2 / 4 if lamp.of("normalize", False) else math.pi * radius**2)
     if lamp.cone >= 90:
         return PointLight(lamp.center, intensity)
     softness = min(max(float(lamp.of("shaping:cone:softness", 0.0)), 0.0), 1.0)
@@ -129,14 +160,14 @@ def _ball(lamp: Lamp) -> Light | Shape:
 def _disk(lamp: Lamp) -> Shape:
     check_even(lamp.matrix, lamp.lose)
     lamp.plain()
-    radius = lamp.length("radius", 0.5)
+    radius = lamp.size("radius", 0.5)
     glow = lamp.strength(math.pi * radius**2)
     return Disk(lamp.center, -lamp.axes[:, 2], radius, emission=glow, name=lamp.name)
 
 
 def _rectangle(lamp: Lamp) -> Shape:
     lamp.plain(image=False)
-    width, height = lamp.length("width", 1.0, 0), lamp.length("height", 1.0, 1)
+    width, height = lamp.size("width", 1.0, 0), lamp.size("height", 1.0, 1)
     glow: Any = lamp.strength(width * height)
     file = lamp.of("texture:file", None)
     image = None if file is None else lamp.materials.pixels(lamp.prim, file)
@@ -151,18 +182,60 @@ def _cylinder(lamp: Lamp) -> Shape | None:
     lamp.plain()
     if lamp.flag("treatAsLine"):
         lamp.lose("treatAsLine")
-    half, radius = float(lamp.of("length", 1.0)) / 2, float(lamp.of("radius", 0.5))
+    along_x, across = float(lamp.scale[0]), math.sqrt(lamp.scale[1] * lamp.scale[2])
+    half = lamp.size("length", 1.0, 0) / along_x / 2
+    radius = float(lamp.of("radius", 0.5)) or lamp.size("radius", 0.0) / across
     side = along("X", revolved(lamp.name, [slope((radius, radius), (-half, half))]))
-    along_x, y, z = lamp.scale.tolist()
-    side.emission = lamp.strength(4 * math.pi * radius * math.sqrt(y * z) * half * along_x)
+    side.emission = lamp.strength(4 * math.pi * radius * across * half * along_x)
     return build("", moved_raw(side, lamp.matrix), lamp.materials.files.losses)
 
 
-LAMPS = {
-    "SphereLight": _ball,
-    "DiskLight": _disk,
-    "RectLight": _rectangle,
-    "CylinderLight": _cylinder,
-    "DistantLight": _distant,
-    "DomeLight": _dome,
+def is_light(prim: Any) -> bool:
+    """Return whether a mesh or a solid is a light, as by `MeshLightAPI`."""
+    from pxr import UsdLux
+
+    return bool(prim.HasAPI(UsdLux.LightAPI))
+
+
+def light_up(lamp: Lamp, raws: list[RawMesh]) -> None:
+    """Make the meshes of a prim emit the light that it is, as `light:materialSyncMode` says.
+
+    Source: OpenUSD, UsdLux, LightAPI and MeshLightAPI.
+    """
+    lamp.plain_inputs()
+    lamp.plain()
+    corners = np.concatenate([moved_raw(raw, lamp.matrix).vertices[raw.faces] for raw in raws])
+    sides = corners[:, 1:] - corners[:, :1]
+    glow = lamp.strength(float(np.linalg.norm(np.cross(sides[:, 0], sides[:, 1]), axis=1).sum() / 2))
+    mode = str(value_of(lamp.prim, lamp.materials.time, "light:materialSyncMode", TINTED))
+    for raw in raws:
+        if mode == "noMaterialResponse":
+            raw.material, raw.emission = BLACK, None
+        elif mode != TINTED and raw.emission is not None:
+            lamp.lose(f"light:materialSyncMode {mode!r}", "the light in place of the material's own")
+            raw.emission = None
+        raw.emission = _tinted(raw.emission, glow, lamp)
+
+
+def _tinted(own: Any, glow: Doubles, lamp: Lamp) -> Any:
+    """Return the light of a mesh whose material may have light of its own, which it colors."""
+    if own is None:
+        return glow
+    if isinstance(own, Texture):
+        tinted = copy(own)
+        tinted.scale = own.scale * glow
+        return tinted
+    if isinstance(own, BaseTexture):
+        lamp.lose("the colors of its emission")
+        return glow
+    return np.asarray(own, float) * glow
+
+
+LAMPS: dict[str, tuple[Any, ...]] = {  # what makes each type, and the inputs that are its size
+    "SphereLight": (_ball, "radius"),
+    "DiskLight": (_disk, "radius"),
+    "RectLight": (_rectangle, "width", "height"),
+    "CylinderLight": (_cylinder, "length", "radius"),
+    "DistantLight": (_distant,),
+    "DomeLight": (_dome,),
 }

@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 
 from ...arrays.elementary import sin_cos_turns
+from ...arrays.vec import FLOAT32_MAX
 from ...bsdfs import Diffuse, Principled
 from ...core.errors import LimitError, SceneError
 from ...materials import Material
@@ -20,6 +21,8 @@ from ...textures.image import StoredImage
 from ..gltf_specular_glossiness import F0
 from ..repair import RawMesh
 from ..sources import MISSING, SceneFiles
+from .layers import typed
+from .tints import Tint
 
 WRAPS = {"repeat": "repeat", "clamp": "clamp", "mirror": "mirror", "useMetadata": "repeat"}
 NUMBERS = {  # theirs, ours and the default
@@ -29,11 +32,17 @@ NUMBERS = {  # theirs, ours and the default
     "clearcoat": ("clearcoat", 0.0),
     "clearcoatRoughness": ("clearcoat_roughness", 0.01),
 }
+GRAY, BLACK = (0.18, 0.18, 0.18), (0.0, 0.0, 0.0)  # defaults
+LEAST_IOR = 1e-6
 CHANNELS = {"r": 0, "g": 1, "b": 2, "a": 3}
 COLORED = Material(Diffuse(VertexColors()))
+VEILED = Material(Diffuse(VertexColors()), alpha=VertexColors(channel=3))
+PURPOSES = ("preview", "full")  # of a material; one that is bound for all comes after the first
 MOST_MOVES = 16  # transforms of texture coordinates one after the other
 # the fields of a mesh that primvars become, by their readers
 COORDINATES, COLORS = ("uvs", "uvs1"), ("colors",)
+UNCOLORED = 0.5  # of what has an opacity alone
+OPACITY = "opacity"  # no field, but the fourth column of the colors
 
 
 @dataclass(eq=False)
@@ -43,37 +52,72 @@ class Look:
     material: Material | None = None
     emission: Any = None
     primvars: dict[str, str] = field(default_factory=dict)
+    fallbacks: dict[str, Any] = field(default_factory=dict)  # of their readers, where these have some
 
     def material_for(self, raw: RawMesh) -> Material | None:
         """Return the material; that of the vertex colors where none is bound."""
-        return COLORED if self.material is None and raw.colors is not None else self.material
+        if self.material is not None or raw.colors is None:
+            return self.material
+        return COLORED if raw.colors.shape[1] == 3 else VEILED
 
 
 class Materials:
     """The materials of a stage, each converted once."""
 
-    def __init__(self, files: SceneFiles, time: Any, lose: Callable[[Any, str], None]) -> None:
+    def __init__(self, files: SceneFiles, time: Any, lose: Callable[..., None]) -> None:
         self.files, self.time, self.lose = files, time, lose
         self._none = Look()
-        self._made: dict[str, Look] = {}
+        self._made: dict[tuple[str, tuple[Any, ...]], Look] = {}
         self._images: dict[str, Any] = {}
 
-    def of(self, prim: Any) -> Look:
-        """Return the look of a prim; without a bound material it has none of its own."""
+    def of(self, prim: Any, tint: Tint | None = None) -> Look:
+        """Return the look of a prim; without a bound material it has none of its own.
+
+        The values of `tint` count in place of primvars that its shaders read.
+        """
         from pxr import UsdShade
 
-        bound = UsdShade.MaterialBindingAPI(prim).ComputeBoundMaterial()[0]
-        if not bound:
+        binding = UsdShade.MaterialBindingAPI(prim)
+        found = (binding.ComputeBoundMaterial(purpose)[0] for purpose in PURPOSES)
+        bound = next((each for each in found if each), None)
+        if bound is None:
             return self._none
-        key = str(bound.GetPath())
+        path = str(bound.GetPath())
+        key = path, tuple((tint or {}).items())
         if key not in self._made:
-            self._made[key] = self._converted(bound)
+            look = Look(Material(Diffuse(0.5), name=str(bound.GetPrim().GetName())))
+            with self.files.losses.part(path, "a gray Diffuse in its place"), typed("is damaged"):
+                look = self._converted(bound, tint or {})
+            self._made[key] = look
         return self._made[key]
 
-    def _converted(self, bound: Any) -> Look:
+    def tinted(self, prim: Any, raw: RawMesh, tint: Tint) -> Material | None:
+        """Return the material of an instance of the mesh of a prim, which has values of its own."""
+        look = self.of(prim)
+        if look.material is not None:
+            read = [name for each, name in look.primvars.items() if each in ("colors", OPACITY)]
+            return self.of(prim, {name: tint[name] for name in read if name in tint}).material
+        return self.plain(tint, raw.colors is not None, raw.colors is not None and raw.colors.shape[1] == 4)
+
+    def plain(self, tint: Tint, colored: bool, veiled: bool) -> Material:
+        """Return the material of a color and an opacity, which those of the vertices stand for otherwise."""
+        key = "", (*tint.items(), colored, veiled)
+        if key not in self._made:
+            color: Any = VertexColors() if colored else UNCOLORED
+            alpha: Any = VertexColors(channel=3) if veiled else None
+            if "displayColor" in tint:
+                color = np.clip(tint["displayColor"], 0, 1)
+            if "displayOpacity" in tint:
+                alpha = _part(*tint["displayOpacity"])
+            self._made[key] = Look(Material(Diffuse(color), alpha=alpha))
+        made = self._made[key].material
+        assert made is not None
+        return made
+
+    def _converted(self, bound: Any, tint: Tint) -> Look:
         shader, *_ = bound.ComputeSurfaceSource()
         if shader and shader.GetIdAttr().Get() == "UsdPreviewSurface":
-            return _Surface(self, shader).look(bound.GetPrim().GetName())
+            return _Surface(self, shader, tint).look(bound.GetPrim().GetName())
         self.lose(bound.GetPrim(), "its surface shader; a gray Diffuse in its place")
         return Look(Material(Diffuse(0.5), name=bound.GetPrim().GetName()))
 
@@ -110,26 +154,41 @@ class Materials:
         return bytes(asset.GetBuffer())
 
 
+def _part(alpha: float) -> float | None:
+    """Return an opacity, None where it is complete."""
+    return None if alpha >= 1 else max(alpha, 0.0)
+
+
 class _Surface:
     """A UsdPreviewSurface, and the primvars that its textures read."""
 
-    def __init__(self, materials: Materials, shader: Any) -> None:
-        self.materials, self.shader = materials, shader
+    def __init__(self, materials: Materials, shader: Any, tint: Tint) -> None:
+        self.materials, self.shader, self.tint = materials, shader, tint
         self.time, self.lose = materials.time, materials.lose
         self.primvars: dict[str, str] = {}
+        self.fallbacks: dict[str, Any] = {}
 
     def look(self, name: str) -> Look:
         """Return the material, which gets a name."""
         if self._value("displacement", 0.0) != 0:
             self.lose(self.shader.GetPrim(), "displacement")
-        numbers = {ours: self._value(theirs, default) for theirs, (ours, default) in NUMBERS.items()}
+        numbers = {
+            ours: self._within(theirs, self._value(theirs, default), default)
+            for theirs, (ours, default) in NUMBERS.items()
+        }
         if self._value("useSpecularWorkflow", 0.0) == 1:
-            tint = self._value("specularColor", (0.0, 0.0, 0.0), color=True, times=1 / F0)
+            tint = self._value("specularColor", BLACK, color=True, times=1 / F0)
+            tint = self._within("specularColor", tint, BLACK, 1 / F0)
             numbers |= {"metallic": 0.0, "ior": 1.5, "specular_color": tint}
-        base = self._value("diffuseColor", (0.18, 0.18, 0.18), color=True)
-        opacity, cut = self._value("opacity", 1.0), self._value("opacityThreshold", 0.0)
+        base = self._value("diffuseColor", GRAY, color=True)
+        base = self._within("diffuseColor", base, GRAY)
+        opacity, cut = (
+            self._within(theirs, self._value(theirs, default), default)
+            for theirs, default in (("opacity", 1.0), ("opacityThreshold", 0.0))
+        )
         normal = self._value("normal", None, color=True, normal=True)
-        glow = self._value("emissiveColor", (0.0, 0.0, 0.0), color=True)
+        glow = self._value("emissiveColor", BLACK, color=True)
+        glow = self._within("emissiveColor", glow, BLACK, FLOAT32_MAX)
         material = Material(
             Principled(base, **numbers),
             alpha=None if isinstance(opacity, float) and opacity >= 1 else opacity,
@@ -138,12 +197,34 @@ class _Surface:
             name=name,
         )
         emission = glow if isinstance(glow, BaseTexture) or any(glow) else None
-        return Look(material, emission, self.primvars)
+        return Look(material, emission, self.primvars, self.fallbacks)
+
+    def _within(self, name: str, value: Any, default: Any, high: float = 1.0) -> Any:
+        """Return the value of an input, clamped to its range where it is outside, which is noted."""
+        if not isinstance(value, float | tuple):
+            return value
+        place = str(self.shader.GetPrim().GetPath())
+        low, high = (LEAST_IOR, 1 / LEAST_IOR) if name == "ior" else (0.0, high)
+        if not np.isfinite(value).all():
+            self.materials.files.losses.note(f"inputs:{name}", place, str(value), "its default in its place")
+            return default
+        limited = self.materials.files.losses.within(f"inputs:{name}", value, low, high, place)
+        return tuple(limited.tolist()) if isinstance(value, tuple) else float(limited)
 
     def _value(
         self, name: str, default: Any, color: bool = False, normal: bool = False, times: float = 1.0
     ) -> Any:
-        """Return an input, times a factor: a float, a color as a tuple, or a texture."""
+        """Return an input, times a factor: a float, a color as a tuple, or a texture.
+
+        It is the default where it is damaged.
+        """
+        place = str(self.shader.GetPrim().GetPath())
+        losses = self.materials.files.losses
+        with losses.part(place, f"the default of {name} in its place"), typed("is damaged"):
+            return self._read(name, default, color, normal, times)
+        return default
+
+    def _read(self, name: str, default: Any, color: bool, normal: bool, times: float) -> Any:
         sources = _sources(self.shader, name)
         if not sources:
             return default
@@ -161,8 +242,14 @@ class _Surface:
         self, source: Any, output: str, default: Any, color: bool, normal: bool, times: float
     ) -> Any:
         kind = _kind(source)
-        if kind.startswith("UsdPrimvarReader_float3") and color:
+        given = self.tint.get(str(self._get(source, "varname", ""))) if "PrimvarReader" in kind else None
+        if given is not None and not normal:
+            row = tuple(float(part) * times for part in given)
+            return row if color and len(row) == 3 else row[0] if not color else default
+        if kind.startswith("UsdPrimvarReader_float3") and color and not normal and times == 1:
             return default if self._primvar(source, COLORS) is None else VertexColors()
+        if kind == "UsdPrimvarReader_float" and not color:
+            return default if self._primvar(source, (OPACITY,)) is None else VertexColors(channel=3)
         path = self._get(source, "file")
         if kind != "UsdUVTexture" or path is None:
             self.lose(source.GetPrim(), f"the shader {kind!r}" if kind != "UsdUVTexture" else "file")
@@ -196,9 +283,10 @@ class _Surface:
         value = self._get(source, "fallback")
         if value is None or normal:
             return default
+        row = np.ravel(value)
         if color:
-            return tuple(float(part) * times for part in value[:3])
-        return float(value[CHANNELS.get(output, 0)]) * times
+            return tuple(float(part) * times for part in np.resize(row, 3))
+        return float(row[min(CHANNELS.get(output, 0), len(row) - 1)]) * times
 
     def _get(self, source: Any, name: str, default: Any = None) -> Any:
         sources = _sources(source, name)
@@ -237,6 +325,9 @@ class _Surface:
             self.lose(reader.GetPrim(), "its varname, which is empty")
         elif found is None:
             self.lose(reader.GetPrim(), f"the primvar {name!r}, as there are {len(fields)} before it")
+        fallback = self._get(reader, "fallback")
+        if found is not None and fallback is not None:
+            self.fallbacks.setdefault(found, fallback)
         return found
 
     def _field(self, name: str, fields: tuple[str, ...]) -> str | None:

@@ -5,33 +5,34 @@ from __future__ import annotations
 import math
 import os
 from collections.abc import Iterator
-from dataclasses import dataclass
+from contextlib import contextmanager
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from ...bsdfs import Diffuse
 from ...camera import Camera
 from ...camera.projection import Orthographic, Perspective, Projection
 from ...core.errors import LimitError, SceneError, hear_warnings, number, passed_limit
 from ...lights import Light
 from ...materials import Material
-from ...scene.loss import Loss
+from ...scene.loss import NOT_HONORED, Loss
 from ...shapes import Shape, Sphere
 from ...shapes.transform import Matrix
 from ..contents import Contents
 from ..conversion import placed
-from ..placing import Places
+from ..placing import Places, in_range
 from ..repair import RawMesh
 from ..sources import LoadLimits, SceneFiles
 from ..xml_checks import MAX_DEPTH
 from .child import CHILD, limited_memory
 from .gprims import GPRIMS
-from .layers import MOST_PRIMS, Layers, said
-from .lights import LAMPS, Lamp
-from .materials import Materials
+from .layers import MOST_PRIMS, Layers, said, typed
+from .lights import LAMPS, Lamp, is_light, light_up
+from .materials import OPACITY, Materials
 from .meshes import Meshes
+from .tints import DISPLAYED, Tint, grouped, has_own, outside
 from .values import is_even, mean_scale, value_of
 
 HEIGHT = 512  # pixels of the picture of a camera
@@ -55,7 +56,7 @@ def read_usd(files: SceneFiles, time: float | None = None) -> Contents:
         raise SceneError(f"{name}: files of USD need usd-core: pip install usd-core") from error
     arguments = name, files.search_paths, files.limits, time
     found: _Found = CHILD.call(name, files.limits.seconds, _in_child, *arguments)
-    files.losses.take(found.losses)
+    files.losses.take(found.losses, found.notices)
     if found.error is not None:
         raise found.error
     assert found.contents is not None
@@ -67,6 +68,7 @@ class _Found:
     contents: Contents | None
     error: SceneError | None  # in their place
     losses: tuple[Loss, ...]
+    notices: tuple[Loss, ...]
 
 
 def _in_child(name: str, search_paths: tuple[Path, ...], limits: LoadLimits, time: float | None) -> _Found:
@@ -82,21 +84,26 @@ def _in_child(name: str, search_paths: tuple[Path, ...], limits: LoadLimits, tim
         except SceneError as wrong:
             message = str(wrong) if str(wrong).startswith(name) else f"{name}: {wrong}"
             error = (LimitError if passed_limit(wrong) else SceneError)(message)
-    return _Found(contents, error, files.losses.found)
+    return _Found(contents, error, files.losses.found, files.losses.notices)
 
 
 def _read(files: SceneFiles, time: float | None) -> Contents:
     from pxr import Usd
 
-    try:
+    with typed(f"{files.name}: cannot be read"):
         layers = Layers(files)
         layers.check_size()
         stage = Usd.Stage.Open(layers.open[layers.root])
         return _Reader(files, stage, time).contents()
-    except (SceneError, MemoryError):
-        raise
-    except Exception as error:  # of pxr.Tf, and of any type where values are of others than the schema has
-        raise SceneError(f"{files.name}: cannot be read: {said(error)}") from error
+
+
+@dataclass
+class _Prototype:
+    """What an instancer places."""
+
+    prim: Any
+    matrices: Matrix  # (n, 4, 4) relative to the instancer
+    tint: Tint
 
 
 class _Reader:
@@ -109,18 +116,24 @@ class _Reader:
         self.materials = Materials(files, self.time, self.lose)
         self.meshes = Meshes(self.materials)
         self.raws: list[RawMesh] = []
-        self.of_prim: dict[Any, list[int]] = {}
-        self.placed: list[tuple[int, Matrix]] = []  # of a mesh, and its places (n, 4, 4)
-        self._instancers: dict[str, list[tuple[Any, Matrix]]] = {}
+        self.of_prim: dict[Any, list[tuple[int, Any]]] = {}
+        self.placed: list[tuple[int, Matrix, Material | None]] = []  # of a mesh, and its places (n, 4, 4)
+        self._instancers: dict[str, list[_Prototype]] = {}
         self._found: dict[str, list[tuple[Any, str, Matrix, bool]]] = {}
         self._sizes: dict[str, int] = {}
         self.shapes: list[Shape] = []
         self.lights: list[Light] = []
         self.camera: Camera | None = None
 
-    def lose(self, prim: Any, what: str) -> None:
-        """Note what is not honored."""
-        self.files.losses.note(what, str(prim.GetPath()))
+    def lose(self, prim: Any, what: str, done: str = NOT_HONORED) -> None:
+        """Note what is not honored, or left out."""
+        self.files.losses.note(what, str(prim.GetPath()), done=done)
+
+    @contextmanager
+    def part(self, prim: Any) -> Iterator[None]:
+        """Read a part of the stage in a block; it is left out if it is damaged."""
+        with self.files.losses.part(str(prim.GetPath())), typed("is damaged"):
+            yield
 
     def contents(self) -> Contents:
         """Return what the stage holds."""
@@ -132,10 +145,15 @@ class _Reader:
             self.files.losses.note(said(error), "composition")
         self.root = np.diag([self.unit] * 3 + [1.0])  # from the stage to the scene
         self._count(self.stage.GetPseudoRoot(), ())
-        self._place(self.stage.GetPseudoRoot(), self.root[None])
-        counts = [len(matrices) for _, matrices in self.placed]
-        numbers = np.repeat(np.array([index for index, _ in self.placed], np.intp), counts)
-        places = Places(numbers, np.concatenate([np.zeros((0, 4, 4)), *(each for _, each in self.placed)]))
+        self._place(self.stage.GetPseudoRoot(), self.root[None], {})
+        counts = [len(matrices) for _, matrices, _ in self.placed]
+        numbers = np.repeat(np.array([index for index, *_ in self.placed], np.intp), counts)
+        matrices = np.concatenate([np.zeros((0, 4, 4)), *(each for _, each, _ in self.placed)])
+        materials = [made for *_, made in self.placed]
+        places = Places(numbers, matrices)
+        if any(made is not None for made in materials):
+            parts = zip(materials, counts, strict=True)
+            places.materials = [made for made, count in parts for _ in range(count)]
         up = str(UsdGeom.GetStageUpAxis(self.stage)).lower()
         return Contents(self.raws, places, self.lights, self.camera, self.shapes, up=up)
 
@@ -157,20 +175,35 @@ class _Reader:
             for prim, kind, *_ in self._leaves(top):
                 count += 1
                 if kind == "PointInstancer":
-                    parts = self._prototypes(prim)
-                    count += sum(len(places) * self._count(each, (*above, key)) for each, places in parts)
+                    count += self._count_prototypes(prim, (*above, key))
                 if count > self.files.limits.instances:
                     raise LimitError(f"{prim.GetPath()}: is beyond the limit LoadLimits.instances")
             self._sizes[key] = count
         return self._sizes[key]
 
-    def _place(self, top: Any, matrices: Matrix) -> None:
+    def _count_prototypes(self, prim: Any, above: tuple[str, ...]) -> int:
+        """Return how much an instancer places; what is damaged, or would place itself, is left out."""
+        count, sound = 0, []
+        with self.part(prim):
+            for each in self._prototypes(prim):
+                with self.part(prim):
+                    count += len(each.matrices) * self._count(each.prim, above)
+                    sound.append(each)
+        self._instancers[str(prim.GetPath())] = sound
+        return count
+
+    def _place(self, top: Any, matrices: Matrix, tint: Tint) -> None:
         """Read a prim that stands at several places (n, 4, 4), and all below it."""
         for prim, kind, matrix, resets in self._leaves(top):
             below = np.tile(self.root, (len(matrices), 1, 1)) if resets else matrices
             where = str(prim.GetPath())
-            with np.errstate(all="ignore"), placed(where, where):  # what is not finite is refused
-                self._read(prim, kind, below @ matrix)
+            with self.part(prim), np.errstate(all="ignore"), placed(where, where):  # NaN is refused
+                at = below @ matrix
+                fit = in_range(at)
+                if not fit.all():
+                    self.lose(prim, "a matrix that is not finite or too large", "left out")
+                if fit.any():
+                    self._read(prim, kind, at[fit], tint)
 
     def _leaves(self, top: Any) -> list[tuple[Any, str, Matrix, bool]]:
         """Return what is to be read of a prim and all below it, found once."""
@@ -207,15 +240,15 @@ class _Reader:
                 waiting += [(child, below, alone or resets) for child in reversed(children)]
         return found
 
-    def _read(self, prim: Any, kind: str, matrices: Matrix) -> None:
+    def _read(self, prim: Any, kind: str, matrices: Matrix, tint: Tint) -> None:
         """Read a prim at each of its places (n, 4, 4)."""
         if kind == "PointInstancer":
             for matrix in matrices:
-                self._instancer(prim, matrix)
+                self._instancer(prim, matrix, tint)
         elif kind == "Mesh" or (kind in GPRIMS and not self._is_ball(prim, kind, matrices)):
-            self.placed += [(index, matrices) for index in self._meshes(prim)]
-        elif kind in GPRIMS:
-            self.shapes += [self._ball(prim, matrix) for matrix in matrices]
+            self._place_meshes(prim, matrices, tint)
+        elif kind in GPRIMS:  # balls
+            self.shapes += [self._ball(prim, matrix, tint) for matrix in matrices]
         elif kind in LAMPS:
             lamps = (Lamp(self.materials, prim, matrix, self.unit).light() for matrix in matrices)
             for made in lamps:
@@ -230,31 +263,40 @@ class _Reader:
 
     def _is_ball(self, prim: Any, kind: str, matrices: Matrix) -> bool:
         """Return whether a prim needs no mesh."""
-        return kind == "Sphere" and not self.materials.of(prim).primvars and all(map(is_even, matrices))
+        plain = kind == "Sphere" and not is_light(prim) and not self.materials.of(prim).primvars
+        return plain and all(map(is_even, matrices))
 
-    def _ball(self, prim: Any, matrix: Matrix) -> Sphere:
+    def _ball(self, prim: Any, matrix: Matrix, tint: Tint) -> Sphere:
         look = self.materials.of(prim)
-        color = self.meshes.one_color(prim, "displayColor") if look.material is None else None
-        material = look.material if color is None else Material(Diffuse(color))
+        material = look.material or self._plain(prim, tint)
         radius = float(self._value(prim, "radius", 1.0)) * mean_scale(matrix)
         name = str(prim.GetName())
         return Sphere(matrix[:3, 3], radius, material=material, emission=look.emission, name=name)
 
+    def _plain(self, prim: Any, tint: Tint) -> Material | None:
+        """Return the material of what has none but a color and an opacity, None if it has not even these."""
+        own = dict(tint)
+        for name, field in (("displayColor", "colors"), ("displayOpacity", OPACITY)):
+            value = self.meshes.one(prim, name, field)
+            if value is not None:
+                own[name] = tuple(value.tolist())
+        return self.materials.plain(own, colored=False, veiled=False) if own else None
+
     def _value(self, prim: Any, name: str, default: Any = None) -> Any:
         return value_of(prim, self.time, name, default)
 
-    def _instancer(self, prim: Any, matrix: Matrix) -> None:
-        for target, found in self._prototypes(prim):
-            self._place(target, matrix @ found)
+    def _instancer(self, prim: Any, matrix: Matrix, tint: Tint) -> None:
+        for each in self._prototypes(prim):
+            self._place(each.prim, matrix @ each.matrices, tint | each.tint)
 
-    def _prototypes(self, prim: Any) -> list[tuple[Any, Matrix]]:
-        """Return what an instancer places, and where: (n, 4, 4), relative to it."""
+    def _prototypes(self, prim: Any) -> list[_Prototype]:
+        """Return what an instancer places."""
         key = str(prim.GetPath())
         if key not in self._instancers:
             self._instancers[key] = list(self._read_prototypes(prim))
         return self._instancers[key]
 
-    def _read_prototypes(self, prim: Any) -> Iterator[tuple[Any, Matrix]]:
+    def _read_prototypes(self, prim: Any) -> Iterator[_Prototype]:
         from pxr import UsdGeom
 
         instancer = UsdGeom.PointInstancer(prim)
@@ -263,34 +305,68 @@ class _Reader:
         found = instancer.ComputeInstanceTransformsAtTime(
             self.time, self.time, UsdGeom.PointInstancer.ExcludeProtoXform
         )
+        which = np.asarray(which, np.intp)
+        numbers = np.arange(len(which))
         if len(found) != len(which):  # by a mask, or as the arrays differ
             mask = np.asarray(instancer.ComputeMaskAtTime(self.time), bool)
-            which = np.asarray(which)[mask] if len(mask) == len(which) else which
-        which = np.asarray(which, np.intp)
+            numbers = numbers[mask] if len(mask) == len(which) else numbers
+        if len(numbers) != len(found):
+            raise SceneError(f"has {len(which)} protoIndices and {len(found)} positions")
+        matrices = np.array(found, float).reshape(-1, 4, 4).transpose(0, 2, 1)
+        groups = grouped(prim, self.time, len(which), numbers, self.lose)
+        which = which[numbers]
         bad = which[(which < 0) | (which >= len(prototypes))]
         if len(bad):
-            raise SceneError(f"{prim.GetPath()}: protoIndices has {bad[0]}; there are {len(prototypes)}")
-        if len(which) != len(found):
-            raise SceneError(f"{prim.GetPath()}: has {len(which)} protoIndices and {len(found)} positions")
-        matrices = np.array(found, float).reshape(-1, 4, 4).transpose(0, 2, 1)
-        for index in np.unique(which).tolist():
+            self.lose(prim, f"protoIndices has {bad[0]}; there are {len(prototypes)}", "left out")
+        for index in np.unique(which[(which >= 0) & (which < len(prototypes))]).tolist():
             target = self.stage.GetPrimAtPath(prototypes[index])
             if not target or prim.GetPath().HasPrefix(target.GetPath()):
-                raise SceneError(f"{prim.GetPath()}: its prototype {prototypes[index]} cannot be placed")
-            yield target, matrices[which == index]
+                self.lose(prim, f"its prototype {prototypes[index]} cannot be placed", "left out")
+                continue
+            for tint, part in groups:
+                own = part[which[part] == index]
+                if len(own):
+                    yield _Prototype(target, matrices[own], tint)
 
-    def _meshes(self, prim: Any) -> list[int]:
+    def _place_meshes(self, prim: Any, matrices: Matrix, tint: Tint) -> None:
+        """Place the meshes of a prim, which may have values of primvars from its instance."""
+        if is_light(prim):
+            self._place_lights(prim, matrices)
+            return
+        look = self.materials.of(prim)
+        own = {name: value for name, value in tint.items() if not has_own(prim, name)}
+        read = (name for field, name in look.primvars.items() if field in ("colors", OPACITY))
+        for name in (*DISPLAYED, *read):
+            value = outside(prim, name, self.time)
+            if value is not None:
+                own[name] = value
+        for index, bound in self._meshes(prim, frozenset(own)):
+            material = self.materials.tinted(bound, self.raws[index], own) if own else None
+            self.placed.append((index, matrices, material))
+
+    def _place_lights(self, prim: Any, matrices: Matrix) -> None:
+        """Place the meshes of a prim that is a light."""
+        alike = not self._value(prim, "inputs:normalize", False)  # otherwise the area of each counts
+        for places in [matrices] if alike else matrices[:, None]:
+            raws = [replace(self.raws[index]) for index, _ in self._meshes(prim)]
+            light_up(Lamp(self.materials, prim, places[0], self.unit), raws)
+            self.placed += [(len(self.raws) + i, places, None) for i in range(len(raws))]
+            self.raws += raws
+
+    def _meshes(self, prim: Any, without: frozenset[str] = frozenset()) -> list[tuple[int, Any]]:
         """Return the numbers of the meshes of a prim, one for each material; instances share them.
 
-        Instances of one prototype may have several materials, by what is bound above them.
+        Each is before the prim to which its material is bound. Instances of one prototype may have several
+        materials, by what is bound above them. `without` is as of `Meshes.of`.
         """
         path = prim.GetPrimInPrototype().GetPath() if prim.IsInstanceProxy() else prim.GetPath()
-        key = path, id(self.materials.of(prim))
+        key = path, id(self.materials.of(prim)), without
         if key not in self.of_prim:
             first = len(self.raws)
             with np.errstate(all="ignore"):
-                self.raws += self.meshes.of(prim)
-            self.of_prim[key] = list(range(first, len(self.raws)))
+                made = self.meshes.of(prim, without)
+            self.raws += [raw for _, raw in made]
+            self.of_prim[key] = [(first + i, bound) for i, (bound, _) in enumerate(made)]
         return self.of_prim[key]
 
     def _camera(self, prim: Any, matrix: Matrix) -> None:
@@ -303,20 +379,23 @@ class _Reader:
         focal = float(self._value(prim, "focalLength", 50.0))
         if not (across > 0 and high > 0 and focal > 0 and across < 100 * high):
             raise SceneError(f"{prim.GetPath()}: its apertures and focalLength must be above 0")
-        for name in ("horizontalApertureOffset", "verticalApertureOffset"):
-            if self._value(prim, name, 0.0):
-                self.lose(prim, name)
+        offset = np.array(
+            [float(self._value(prim, f"{name}ApertureOffset", 0.0)) for name in ("horizontal", "vertical")]
+        )
+        axes = matrix[:3, :3] / np.linalg.norm(matrix[:3, :3], axis=0)
+        origin = matrix[:3, 3]
         lens: Projection
         if self._value(prim, "projection", "perspective") == "orthographic":
             lens = Orthographic(high / 10 * self.unit)  # apertures are in tenths of units
+            origin = origin + axes[:, :2] @ (offset / 10 * self.unit)
         else:
             stop, focus = (float(self._value(prim, name, 0.0)) for name in ("fStop", "focusDistance"))
             opened = stop > 0 and focus > 0
             lens = Perspective(
                 math.degrees(2 * math.atan(high / (2 * focal))),
+                shift=(offset[0] / across, offset[1] / high),
                 aperture=focal / 10 / stop * self.unit if opened else 0.0,
                 focus=focus * self.unit if opened else None,
             )
-        axes = matrix[:3, :3] / np.linalg.norm(matrix[:3, :3], axis=0)
         size = (max(round(HEIGHT * across / high), 1), HEIGHT)
-        self.camera = Camera(matrix[:3, 3], axes, lens, size)
+        self.camera = Camera(origin, axes, lens, size)
