@@ -94,10 +94,13 @@ class Part:
         SceneError
             If there is no default.
         """
-        if default is None:
+        try:
             return read()
-        with self.lost.part(self.label, done=f"{_brief(default)} in its place"):
-            return read()
+        except SceneError:
+            if default is None:
+                raise
+            with self.lost.part(self.label, done=f"{_brief(default)} in its place"):
+                raise
         return default
 
     def number(self, name: str, default: float, holds: Any = None, limit: str = "") -> float:
@@ -189,9 +192,13 @@ class Conversion(Generic[P]):
         if part.kind == "scene":
             with placed(part.label, self.name):
                 return self.converted(part)
-        make, done = self.stand_in(part)
-        with self.files.losses.part(part.label, done), placed(part.label, self.name):
-            return self.converted(part)
+        try:
+            with placed(part.label, self.name):
+                return self.converted(part)
+        except SceneError:
+            make, done = self.stand_in(part)
+            with self.files.losses.part(part.label, done):
+                raise
         return make()
 
     def stand_in(self, part: P) -> tuple[Callable[[], Any], str]:

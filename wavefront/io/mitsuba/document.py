@@ -205,7 +205,10 @@ class Document:
 
     def _transform(self, tag: Tag) -> Matrix:
         """Return the matrix of the operations that are sound."""
-        matrix = np.eye(4)
+        try:
+            return product([(each.name, self._substituted(each), each.place) for each in tag.children])
+        except SceneError:
+            matrix = np.eye(4)
         for each in tag.children:
             with self._losses.part(each.place), np.errstate(over="ignore", invalid="ignore"):
                 matrix = product([(each.name, self._substituted(each), each.place)]) @ matrix

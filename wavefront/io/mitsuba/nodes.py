@@ -12,7 +12,7 @@ from ...arrays.vec import Doubles
 from ...core.errors import LimitError, SceneError, finite_array, in_brief, one_of
 from ...core.suggestions import did_you_mean
 from ...shapes.transform import Matrix
-from ..conversion import Conversion, Part, placed
+from ..conversion import Conversion, Part
 from ..losses import Losses
 from ..placing import in_range
 from ..xml_checks import MAX_DEPTH
@@ -230,7 +230,7 @@ class Graph:
             if not isinstance(value, Mapping):
                 node.values[str(name)] = value
                 continue
-            with self._lost.part(label), placed(label, self._name):
+            with self._lost.part(label):
                 inner = "" if _unnamed(name) else str(name)
                 child = self._node(value, f"{path}, {name}", inner, (*above, id(source)))
                 node.size += child.size

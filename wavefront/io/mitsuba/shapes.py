@@ -122,8 +122,7 @@ def _sphere(node: Node, job: Job) -> list[Shape]:
     closed = job.eye is None or bool(np.linalg.norm(job.eye - center) > radius)
     material, emission = _appearance(node, job, closed and not inward)
     turn = None
-    textured = bool(textures_in((material, emission), Texture))
-    if textured or _has_grain(material):
+    if {"uv", "tangent_frame"} & _reads((material, emission)):
         material, emission = _for_spheres(material, emission, job)
         left, _, right = np.linalg.svd(matrix[:3, :3])
         turn = left @ right @ POLES

@@ -38,6 +38,8 @@ OLDER: dict[tuple[str, str], tuple[str | None, dict[str, str]]] = {
 def upgrade(entity: Entity) -> None:
     """Give an entity of an older version, or a material that is unknown, the nearest type, which is noted."""
     kind = entity.kind.removeprefix("float ").removeprefix("spectrum ")
+    if (kind, entity.type) in TABLE and kind != "light":
+        return
     nearest, names = OLDER.get((kind, entity.type), (None, {}))
     given = next((name for name in COLORS if name in entity.values), None)
     if (kind, entity.type) in OLDER:
