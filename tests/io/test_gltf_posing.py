@@ -7,13 +7,12 @@ from typing import Any
 
 import numpy as np
 import pytest
-from gltf_builder import TRIANGLE, TYPES, Builder
+from gltf_builder import TRIANGLE, Builder
 
 import wavefront as wf
 from wavefront.io.gltf_posing import Bend, Skin, pose
 from wavefront.io.repair import RawMesh
 
-TYPES.setdefault(16, "MAT4")
 TURN = np.array([[0, -1, 0], [1, 0, 0], [0, 0, 1]])  # a quarter about z
 
 

@@ -78,8 +78,15 @@ def everything(path):
         "TEXCOORD_0": TRIANGLE[:, :2],
         "TEXCOORD_1": TRIANGLE[:, :2],
         "COLOR_0": np.full((3, 4), 0.5, np.float32),
+        "JOINTS_0": np.array([[0, 1, 0, 0]] * 3, np.uint8),
+        "WEIGHTS_0": np.array([[0.75, 0.25, 0, 0]] * 3, np.float32),
     }
     build.mesh(attributes, np.array([0, 1, 2], np.uint16), material=0)
+    part = build.json["meshes"][0]["primitives"][0]
+    part["targets"] = [{"POSITION": build.accessor(TRIANGLE), "NORMAL": build.accessor(TRIANGLE)}]
+    build.json["meshes"][0]["weights"] = [0.5]
+    inverse = build.accessor(np.array([np.eye(4).ravel()] * 2, np.float32))
+    build.json["skins"] = [{"joints": [3, 4], "inverseBindMatrices": inverse}]
     build.json["accessors"][0]["sparse"] = {
         "count": 1,
         "indices": {"bufferView": build.view(np.array([2], np.uint16).tobytes()), "componentType": 5123},
