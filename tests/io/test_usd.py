@@ -728,3 +728,32 @@ def test_binary_files_and_archives_with_images(tmp_path: Path) -> None:
     (mesh,) = wf.load(tmp_path / "alone" / "packed.usdz", strict=True).shapes
     assert mesh.material.bsdf.base_color.size == (4, 4)
     assert mesh.material.bsdf.base_color.wrap == ("mirror", "clamp")
+
+
+@pytest.mark.parametrize(
+    ("body", "message"),
+    [
+        (MESH.replace("board", "torn").replace("[4]", "[7]"), "/torn: .* left out"),
+        ('def SphereLight "lamp"\n{\n    float inputs:radius = -1\n}\n', "/lamp: .*radius.*; left out"),
+        (
+            'def PointInstancer "many"\n{\n    rel prototypes = </board>\n    int[] protoIndices = [5]\n'
+            "    point3f[] positions = [(0, 0, 0)]\n}\n",
+            "/many: protoIndices has 5; there are 1; left out",
+        ),
+        (
+            'def PointInstancer "many"\n{\n    rel prototypes = </board>\n    int[] protoIndices = [0, 0]\n'
+            "    point3f[] positions = [(0, 0, 0)]\n}\n",
+            r"usd-core: /many -- found \[1\] positions, but expected \[2\]",
+        ),
+    ],
+)
+def test_a_damaged_prim_costs_itself_and_what_usd_core_says_is_listed(
+    tmp_path: Path, body: str, message: str, capfd: pytest.CaptureFixture[str]
+) -> None:
+    with pytest.warns(UserWarning, match=message) as told:
+        scene = load(tmp_path, MESH + body, strict=False)
+    assert len(told) == 1
+    assert scene.shapes[0].name == "board"
+    assert "positions" not in capfd.readouterr().err
+    with pytest.raises(wf.SceneError, match=message):
+        load(tmp_path, MESH + body)

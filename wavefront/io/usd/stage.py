@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import os
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -22,6 +22,7 @@ from ...shapes import Shape, Sphere
 from ...shapes.transform import Matrix
 from ..contents import Contents
 from ..conversion import placed
+from ..losses import Losses
 from ..placing import Places, in_range
 from ..repair import RawMesh
 from ..sources import LoadLimits, SceneFiles
@@ -78,13 +79,26 @@ def _in_child(name: str, search_paths: tuple[Path, ...], limits: LoadLimits, tim
     files = SceneFiles(name, search_paths, limits)
     files.budget.add_file(os.path.getsize(name))
     contents, error = None, None
-    with hear_warnings(files.losses.hear), limited_memory(files.budget):
+    with hear_warnings(files.losses.hear), _heard(files.losses), limited_memory(files.budget):
         try:
             contents = _read(files, time)
         except SceneError as wrong:
             message = str(wrong) if str(wrong).startswith(name) else f"{name}: {wrong}"
             error = (LimitError if passed_limit(wrong) else SceneError)(message)
     return _Found(contents, error, files.losses.found, files.losses.notices)
+
+
+@contextmanager
+def _heard(losses: Losses) -> Iterator[None]:
+    """Note what usd-core writes to the standard error, but errors of composition, which the stage has."""
+    from pxr import UsdUtils
+
+    delegate = UsdUtils.CoalescingDiagnosticDelegate()
+    yield
+    for each in delegate.TakeUncoalescedDiagnostics():
+        with suppress(UnicodeDecodeError):
+            if "_ReportErrors" not in each.sourceFunction:
+                losses.note(said(each.commentary), "usd-core", done="")
 
 
 def _read(files: SceneFiles, time: float | None) -> Contents:
