@@ -282,6 +282,16 @@ def test_values_by_a_hair_are_clamped() -> None:
     eye = {"type": "perspective", "fov": 60.0, "film": {"type": "hdrfilm", "width": 8.0000001}}
     with pytest.warns(UserWarning, match=r"width is 8\.0000001; taken as 8"):
         assert scene(False, eye=eye).camera.size[0] == 8
+    data = np.array([[[-1.0, 0.5, 2], [3, 1, 0]]], np.float32)
+    image = {"type": "bitmap", "data": data, "raw": True, "filter_type": "nearest"}
+    board = {"type": "rectangle", "b": {"type": "diffuse", "reflectance": image}}
+    at_left = SimpleNamespace(uv=np.array([[0.25], [0.5]], np.float32))
+    with pytest.warns(UserWarning, match="reflectance, a texture, is -1 to 3; clamped to 0 to 1"):
+        made = scene(False, board=board).shapes[0].material.bsdf.front
+    assert value(made.reflectance.at(at_left)) == [0, 0.5, 1]
+    with pytest.warns(UserWarning, match="radiance, a texture, is -1 to 3; clamped to 0 to more"):
+        made = scene(False, lamp={"type": "rectangle", "e": {"type": "area", "radiance": image}}).shapes[0]
+    assert value(made.emission.at(at_left)) == [0, 0.5, 2]
     nearly = np.diag([2.0, 2, 2, 0.9999999])
     with pytest.warns(UserWarning, match=r"last row is .*0\.9999999.*; divided by it"):
         ball = scene(False, ball={"type": "sphere", "to_world": nearly}).shapes[0]

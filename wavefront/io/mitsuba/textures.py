@@ -20,7 +20,7 @@ from ...core.errors import SceneError, as_array, exact, finite_array, in_brief, 
 from ...textures.base import BaseTexture
 from ...textures.image import Texture
 from ...textures.vertex_colors import VertexColors
-from ..pbrt.textures import clipped
+from ..pbrt.textures import clipped, computed
 from ..spectra import pairs_of
 from ..text_lines import numbers
 from .nodes import Job, Node, plugin, unsupported
@@ -77,10 +77,10 @@ def _within(node: Node, name: str, value: Value, use: Use) -> Value:
         limited = node.lost.within(name, value, 0.0, most, node.label)
         return limited if np.ndim(value) else float(limited)
     limits = value.limits()
-    if limits and use == "albedo" and (limits[0] < 0 or limits[1] > most):
-        found = f"{exact(limits[0])} to {exact(limits[1])}"
-        node.lost.note(f"{name}, a texture,", node.label, found, "clamped to 0 to 1")
-        return clipped(value)
+    if limits and (limits[0] < 0 or limits[1] > most):
+        found, end = f"{exact(limits[0])} to {exact(limits[1])}", "1" if use == "albedo" else "more"
+        node.lost.note(f"{name}, a texture,", node.label, found, f"clamped to 0 to {end}")
+        return clipped(value) if use == "albedo" else computed(np.maximum, value, 0.0)
     return value
 
 
