@@ -58,6 +58,6 @@ if __name__ == "__main__":
     parser.add_argument("--size", type=int, default=512)
     options = parser.parse_args()
     scene = cornell_box(options.size)
-    scene.camera = wf.Camera.look_at((0, 0, 3.9), (0, 0, 0), fov=37.9, size=scene.camera.size)  # the room alone
+    scene.camera = wf.Camera.look_at((0, 0, 3.9), (0, 0, 0), fov=37.9, size=scene.camera.size)  # fills it
     wf.render(scene, options.spp, denoise=True).save(options.output, exposure=1.0)
     print(f"wrote {options.output}")

@@ -134,7 +134,7 @@ def test_metals() -> None:
     assert np.array_equal(wf.Conductor.named("Aluminum").k, wf.Conductor.named("aluminium").k)
     with pytest.raises(wf.SceneError, match=r"must be one of aluminum, .*titanium; did you mean 'silver'\?"):
         wf.Conductor.named("Silvr")
-    with pytest.raises(wf.SceneError, match=r"Conductor name is 5; it must be one of"):
+    with pytest.raises(wf.SceneError, match=r"Conductor name is 5; it must be text"):
         wf.Conductor.named(5)
 
 

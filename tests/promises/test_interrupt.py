@@ -280,6 +280,6 @@ def test_a_notebook_shows_the_picture(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(sys.modules, "IPython.display", display)
     stopped = wf.Interrupted("stopped", "the picture")
     for _ in range(2):  # kernels ask twice
-        assert stopped._render_traceback_() == ["Interrupted: stopped"]
+        assert stopped._render_traceback_()[0] == "Interrupted: stopped"
     assert wf.Interrupted("early")._render_traceback_() == ["Interrupted: early"]
     assert shown == ["the picture"]

@@ -135,7 +135,7 @@ def test_a_notebook_that_shows_nothing_ends_no_render(monkeypatch: pytest.Monkey
     shown.refine(image)
     shown.end(wf.Image([[[1.0, 1.0, 1.0]]]))
     stopped = wf.Interrupted("stopped", image)
-    assert stopped._render_traceback_() == ["Interrupted: stopped"]
+    assert stopped._render_traceback_()[0] == "Interrupted: stopped"
 
 
 # --- SIGHUP -----------------------------------------------------------------------------------------

@@ -99,7 +99,10 @@ def test_later_samples_are_the_others_of_a_longer_render() -> None:
 @pytest.mark.parametrize(
     ("options", "message"),
     [
-        ({"samples": 64}, r"samples is 64; it must be a range of consecutive samples, such as range\(64, 1"),
+        (
+            {"samples": 6.4},
+            r"samples is 6.4; it must be a range of consecutive samples, such as range\(64, 1",
+        ),
         ({"samples": range(0, 8, 2)}, r"samples is range\(0, 8, 2\)"),
         ({"samples": range(4, 4)}, r"samples is range\(4, 4\)"),
         ({"samples": range(-1, 4)}, r"samples is range\(-1, 4\)"),

@@ -46,7 +46,7 @@ def shapes() -> dict[str, list[wf.Shape]]:
 def covered(scene: wf.Scene, camera: wf.Camera) -> np.ndarray:
     """Return where the scene is in the picture, (height, width)."""
     lit = wf.Scene(scene.shapes, wf.Environment(1))
-    layers = wf.render(lit, 1, camera=camera, aovs="depth", max_bounces=0, progress=False).layers
+    layers = wf.render(lit, 1, camera=camera, aovs="depth", max_bounces=1, progress=False).layers
     return np.isfinite(layers["depth"])
 
 
