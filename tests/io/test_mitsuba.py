@@ -295,7 +295,7 @@ def test_values_by_a_hair_are_clamped() -> None:
     nearly = np.diag([2.0, 2, 2, 0.9999999])
     with pytest.warns(UserWarning, match=r"last row is .*0\.9999999.*; divided by it"):
         ball = scene(False, ball={"type": "sphere", "to_world": nearly}).shapes[0]
-    assert ball.radius == pytest.approx(2, rel=1e-6)
+    assert ball.radius == pytest.approx(2 / 0.9999999, rel=1e-12)
 
 
 def test_texture_coordinates() -> None:
