@@ -612,7 +612,7 @@ def test_lights_at_points(tmp_path: Path) -> None:
 def test_errors_name_file_and_prim(tmp_path: Path) -> None:
     warm = "    bool inputs:enableColorTemperature = 1\n    float inputs:colorTemperature = 3\n"
     for body, message in (
-        (f'def SphereLight "l"\n{{\n{warm}}}\n', "/l: temperature is 3.0; it must be from 100 to 1e6 kelvin"),
+        (f'def SphereLight "l"\n{{\n{warm}}}\n', "/l: inputs:colorTemperature is 3; clamped to 1000"),
         ('def SphereLight "l"\n{\n    float inputs:intensity = nan\n}\n', "/l: "),
         ('def Sphere "s"\n{\n    double radius = -1\n}\n', "/s: "),
     ):

@@ -29,6 +29,7 @@ from .values import check_even, mean_scale, value_of
 PLAIN: dict[str, Any] = {"inputs:diffuse": 1.0, "inputs:specular": 1.0, "inputs:shaping:focus": 0.0}
 PLAIN |= {"inputs:shaping:ies:file": None}  # by their values where they change nothing
 
+KELVIN = 1e3, 1e6  # color temperatures; lower ones are clamped by usd-core, too
 LEAST = 1e-3  # meters, in place of a size of 0
 TINTED = "materialGlowTintsLight"  # what the emission of a material does to the light of its mesh
 BLACK = Material(Diffuse(0.0))
@@ -104,7 +105,9 @@ class Lamp:
         color = np.asarray(self.of("color", (1, 1, 1)), float) * float(self.of("intensity", 1.0))
         color = color * 2.0 ** float(self.of("exposure", 0.0))
         if self.of("enableColorTemperature", False):
-            white = blackbody(float(self.of("colorTemperature", 6500.0)))
+            warm, place = float(self.of("colorTemperature", 6500.0)), str(self.prim.GetPath())
+            kelvin = self.materials.files.losses.within("inputs:colorTemperature", warm, *KELVIN, place)
+            white = blackbody(float(kelvin))
             color = color * (white / luminance(white))
         return color
 

@@ -7,6 +7,7 @@ import os
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -14,7 +15,7 @@ import numpy as np
 
 from ...camera import Camera
 from ...camera.projection import Orthographic, Perspective, Projection
-from ...core.errors import LimitError, SceneError, hear_warnings, number, passed_limit
+from ...core.errors import LimitError, SceneError, hear_warnings, passed_limit
 from ...lights import Light
 from ...materials import Material
 from ...scene.loss import NOT_HONORED, Loss
@@ -23,11 +24,11 @@ from ...shapes.transform import Matrix
 from ..contents import Contents
 from ..conversion import placed
 from ..losses import Losses
-from ..placing import Places, in_range
+from ..placing import Places, in_range, meters
 from ..repair import RawMesh
 from ..sources import LoadLimits, SceneFiles
 from ..xml_checks import MAX_DEPTH
-from .child import CHILD, limited_memory
+from .child import CHILD, heard, limited_memory
 from .gprims import GPRIMS
 from .layers import MOST_PRIMS, Layers, said, typed
 from .lights import LAMPS, Lamp, is_light, light_up
@@ -107,8 +108,9 @@ def _read(files: SceneFiles, time: float | None) -> Contents:
     with typed(f"{files.name}: cannot be read"):
         layers = Layers(files)
         layers.check_size()
-        stage = Usd.Stage.Open(layers.open[layers.root])
-        return _Reader(files, stage, time).contents()
+        with heard(partial(files.losses.note, place="usd-core", done="")):
+            stage = Usd.Stage.Open(layers.open[layers.root])
+            return _Reader(files, stage, time).contents()
 
 
 @dataclass
@@ -144,17 +146,18 @@ class _Reader:
         self.files.losses.note(what, str(prim.GetPath()), done=done)
 
     @contextmanager
-    def part(self, prim: Any) -> Iterator[None]:
+    def part(self, prim: Any, done: str = "left out") -> Iterator[None]:
         """Read a part of the stage in a block; it is left out if it is damaged."""
-        with self.files.losses.part(str(prim.GetPath())), typed("is damaged"):
+        with self.files.losses.part(str(prim.GetPath()), done), typed("is damaged"):
             yield
 
     def contents(self) -> Contents:
         """Return what the stage holds."""
         from pxr import UsdGeom
 
-        unit = float(UsdGeom.GetStageMetersPerUnit(self.stage))
-        self.unit = number("metersPerUnit", unit, lambda x: x > 0, "above 0")
+        self.unit = meters(
+            self.files.losses, "metersPerUnit", UsdGeom.GetStageMetersPerUnit(self.stage), 0.01
+        )
         for error in self.stage.GetCompositionErrors():
             self.files.losses.note(said(error), "composition")
         self.root = np.diag([self.unit] * 3 + [1.0])  # from the stage to the scene
@@ -244,7 +247,9 @@ class _Reader:
                 continue
             if self._value(prim, "purpose") in ("proxy", "guide"):
                 continue
-            own, alone = self.cache.GetLocalTransformation(prim)
+            own, alone = np.eye(4), False
+            with self.part(prim, "its transform left out"):
+                own, alone = self.cache.GetLocalTransformation(prim)
             below = (np.eye(4) if alone else above) @ np.array(own).T
             kind = str(prim.GetTypeName())
             if kind not in HARMLESS:
