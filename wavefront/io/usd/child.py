@@ -10,7 +10,6 @@ import atexit
 import os
 import pickle
 import queue
-import re
 import signal
 import struct
 import subprocess
@@ -36,13 +35,6 @@ IDLE = 60.0  # seconds without a request after which the process ends
 GRACE = 10  # seconds beyond its limit after which a process ends whose parent does not end it
 RESERVED = 2**28  # bytes of memory that usd-core may take for any file
 FRAME = struct.Struct("<Q")  # the length of what follows
-MOST_HEARD = 2**20  # bytes of its warnings for one file
-SAID = re.compile(
-    r"^(?:[\w ]+): in '?([\w:]+)'? at line \d+ of \S+ -- (.*)$", re.MULTILINE
-)  # function, message
-STAGE = re.compile(
-    r",? (?:on stage with rootLayer|sessionLayer) @[^@]*@|<0x[0-9a-f]+>"
-)  # what is no place in the file
 # each thread of usd-core reserves addresses, which count as memory
 QUIET = {"PXR_WORK_THREAD_LIMIT": "4", "MALLOC_ARENA_MAX": "2", "OPENBLAS_NUM_THREADS": "1"}
 
@@ -184,25 +176,6 @@ def _listen(requests: queue.SimpleQueue[bytes]) -> None:
     while (request := _framed(sys.stdin.buffer)) is not None:
         requests.put(request)
     os._exit(0)
-
-
-@contextmanager
-def heard(note: Callable[[str], None]) -> Iterator[None]:
-    """Give a function the warnings that usd-core writes to standard error, a file here, in a block.
-
-    Those about composition are left out, as the stage lists them.
-    """
-    start = os.lseek(2, 0, os.SEEK_CUR)
-    try:
-        yield
-    finally:
-        size = min(os.lseek(2, 0, os.SEEK_CUR) - start, MOST_HEARD)
-        os.lseek(2, start, os.SEEK_SET)
-        text = os.read(2, size).decode(errors="replace")
-        os.lseek(2, 0, os.SEEK_END)
-        for where, message in SAID.findall(text):
-            if where != "_ReportErrors":
-                note(STAGE.sub("", message).strip())
 
 
 @contextmanager

@@ -18,6 +18,7 @@ MOST_PRIMS = 2**20
 PRIMS = 2**16  # that files of any size may stand for; each of their bytes adds one
 MOST_SAID = 300  # letters of a message of usd-core
 WHERE = re.compile(r"^Error in '.*?' at line \d+ in file \S+ : ")  # in the source of usd-core
+STAGE = re.compile(r",? (?:on stage with rootLayer|sessionLayer) @[^@]*@")  # which is no place in the file
 EXTENSIONS = (".usd", ".usda", ".usdc", ".usdz")
 VARIABLE = re.compile(r"\$\{\w+\}")
 
@@ -191,7 +192,7 @@ def typed(what: str) -> Iterator[None]:
 
 def said(error: Any) -> str:
     """Return the message of an error of usd-core on one line."""
-    return WHERE.sub("", " ".join(_text(error).split()))[:MOST_SAID]
+    return STAGE.sub("", WHERE.sub("", " ".join(_text(error).split())))[:MOST_SAID]
 
 
 def _text(error: Any) -> str:

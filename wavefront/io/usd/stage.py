@@ -7,7 +7,6 @@ import os
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass, replace
-from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -28,7 +27,7 @@ from ..placing import Places, in_range, meters
 from ..repair import RawMesh
 from ..sources import LoadLimits, SceneFiles
 from ..xml_checks import MAX_DEPTH
-from .child import CHILD, heard, limited_memory
+from .child import CHILD, limited_memory
 from .gprims import GPRIMS
 from .layers import MOST_PRIMS, Layers, said, typed
 from .lights import LAMPS, Lamp, is_light, light_up
@@ -80,7 +79,7 @@ def _in_child(name: str, search_paths: tuple[Path, ...], limits: LoadLimits, tim
     files = SceneFiles(name, search_paths, limits)
     files.budget.add_file(os.path.getsize(name))
     contents, error = None, None
-    with hear_warnings(files.losses.hear), _heard(files.losses), limited_memory(files.budget):
+    with hear_warnings(files.losses.hear), limited_memory(files.budget):
         try:
             contents = _read(files, time)
         except SceneError as wrong:
@@ -108,7 +107,7 @@ def _read(files: SceneFiles, time: float | None) -> Contents:
     with typed(f"{files.name}: cannot be read"):
         layers = Layers(files)
         layers.check_size()
-        with heard(partial(files.losses.note, place="usd-core", done="")):
+        with _heard(files.losses):
             stage = Usd.Stage.Open(layers.open[layers.root])
             return _Reader(files, stage, time).contents()
 
