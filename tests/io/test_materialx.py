@@ -237,7 +237,6 @@ WRONG = {
     "not a readable file": "<materialx",
     "has a document type": '<!DOCTYPE a [<!ENTITY b "c">]><materialx/>',
     "nested deeper than 32": HEAD + "<a>" * 50 + "</a>" * 50 + "</materialx>",
-    "material 'M': OpenPBRBsdf base_color": document(base_color=(2.0, 0.0, 0.0)),
     "refers to nodes more than": document(
         nodes=f'<constant name="n0" type="float"/>{BOMB}', base_weight=link("base_weight", "float", "n40")
     ),
@@ -249,6 +248,17 @@ def test_wrong_documents(load, message):
     with pytest.raises(wf.SceneError, match=r"a\.mtlx.*" if "file" not in message else ".*") as error:
         load(WRONG[message])
     assert message in str(error.value)
+
+
+def test_a_wrong_value_costs_that_value(load):
+    content = document(base_color=(2.0, 0.0, 0.0), base_metalness=0.5, specular_ior=-3.0)
+    with pytest.warns(UserWarning, match="OpenPBRBsdf base_color") as caught:
+        found = load(content)["M"].bsdf
+    assert len(caught) == 1
+    assert found.base_metalness == pytest.approx(0.5)
+    assert np.ravel(found.base_color) == pytest.approx(np.ravel(wf.OpenPBR().bsdf.base_color))
+    with pytest.raises(wf.SceneError, match="OpenPBRBsdf base_color"):
+        load(content, strict=True)
 
 
 @pytest.mark.parametrize("file", ["a.png", "../../a.png", "C:\\a.png", "broken.png"])

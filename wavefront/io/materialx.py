@@ -297,10 +297,22 @@ class _Document:
             given["specular_ior"] = max(float(given["specular_ior"]), LEAST_INDEX)
         if "geometry_thin_walled" in given:
             given["geometry_thin_walled"] = bool(given["geometry_thin_walled"])
-        try:
-            with hear_warnings(lambda message: self.files.losses.note(message, title, done="")):
+        with hear_warnings(lambda message: self.files.losses.note(message, title, done="")):
+            try:
                 return OpenPBR(**given, name=title)
-        except SceneError as error:
+            except SceneError:
+                return self._without_wrong(title, given)
+
+    def _without_wrong(self, title: str, given: dict[str, Any]) -> Material:
+        """Return a material of those inputs that each have a value that it can have."""
+        kept: dict[str, Any] = {}
+        for name, value in given.items():
+            with self.files.losses.part(f"material {title!r}", f"the default of {name} in its place"):
+                OpenPBR(**{name: value})
+                kept[name] = value
+        try:
+            return OpenPBR(**kept, name=title)
+        except SceneError as error:  # of values together
             raise SceneError(f"{self.name}: material {title!r}: {error}") from error
 
     def _translated(self, title: str, inputs: dict[str, Value]) -> dict[str, Value]:
