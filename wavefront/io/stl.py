@@ -1,4 +1,7 @@
-"""STL: binary files and texts. The normals of facets are not read; damaged facets are left out."""
+"""STL: binary files and texts, read by trimesh after a check; damaged facets are left out.
+
+The normals of facets are not used.
+"""
 
 from __future__ import annotations
 
@@ -10,11 +13,11 @@ from ..core.plural import plural
 from .losses import Losses
 from .repair import RawMesh, wide
 from .text_lines import NUMBER, check_lines, words
+from .trimesh_loading import geometries
 
 COLORS = (b"COLOR=", b"MATERIAL=")  # keywords that Materialize Magics writes into the header
 WORDS = ("", "facet", "outer", "endloop", "endfacet")  # first words of lines that say nothing further
-FACET = np.dtype([("normal", "<f4", 3), ("vertices", "<f4", (3, 3)), ("extra", "<u2")])
-START = 84  # bytes before the facets
+START, FACET = 84, 50  # bytes before the facets of a binary file, and of each
 NO_VERTEX = "vertex nan nan nan"
 
 
@@ -31,18 +34,19 @@ def parse(losses: Losses, data: bytes) -> list[RawMesh]:
         If the file is too short.
     """
     count = int.from_bytes(data[80:START], "little")
-    exact = len(data) >= START and len(data) == START + FACET.itemsize * count
+    exact = len(data) >= START and len(data) == START + FACET * count
     if not exact and _is_text(data):
         return _text(losses, decode_text(data))
     if len(data) < START:
         raise SceneError(f"{losses.name}: has {plural(len(data), 'byte')}; a binary STL has at least {START}")
-    there, rest = divmod(len(data) - START, FACET.itemsize)
+    there, rest = divmod(len(data) - START, FACET)
     if count and rest:
         there = min(there, count)
     if not exact:
         value = f"{count}, but the file has {plural(len(data), 'byte')}"
         losses.note("the number of facets", value=value, done=f"{there} read")
-    return _binary(losses, data, there)
+        data = data[:80] + there.to_bytes(4, "little") + data[START : START + FACET * there]
+    return _binary(losses, data)
 
 
 def _is_text(data: bytes) -> bool:
@@ -50,15 +54,16 @@ def _is_text(data: bytes) -> bool:
     return data.lstrip()[:5].lower() == b"solid" and data.rstrip(b"\0").count(b"\0") < len(data) / 100
 
 
-def _binary(losses: Losses, data: bytes, count: int) -> list[RawMesh]:
-    facets = np.frombuffer(data, FACET, count, START)
+def _binary(losses: Losses, data: bytes) -> list[RawMesh]:
     colored = [f"{word.decode()} in the header" for word in COLORS if word in data[:80]]
-    if facets["extra"].any():
-        colored.append(f"colors of facets (facet {int((facets['extra'] != 0).argmax())})")
+    meshes = geometries(losses.name, "stl", data)
+    for mesh in meshes:
+        extra = mesh["face_attributes"]["stl"]
+        if extra.any():
+            colored.append(f"colors of facets (facet {int((extra != 0).argmax())})")
     for each in colored:
         losses.note(each)
-    corners = wide(facets["vertices"].reshape(-1, 3))
-    return [RawMesh("", corners, np.arange(len(corners)).reshape(-1, 3))] if count else []
+    return [RawMesh("", wide(mesh["vertices"]), mesh["faces"].astype(np.intp)) for mesh in meshes]
 
 
 def _text(losses: Losses, text: str) -> list[RawMesh]:
@@ -84,7 +89,7 @@ def _text(losses: Losses, text: str) -> list[RawMesh]:
             solids += [(lines[at][5:].strip(), [])] * inside
     if inside:
         losses.note("endsolid", value="missing", done="the text ends early")
-    return [_solid(title, lines, at) for title, at in solids if len(at) > 2]
+    return [_solid(losses.name, title, lines, at) for title, at in solids if len(at) > 2]
 
 
 def _kind(number: int, line: str) -> tuple[str, str]:
@@ -98,8 +103,9 @@ def _kind(number: int, line: str) -> tuple[str, str]:
     return "", "" if keyword in WORDS else "left out"
 
 
-def _solid(title: str, lines: list[str], vertices: list[int]) -> RawMesh:
-    written = " ".join([lines[at][6:] for at in vertices])
-    corners = np.fromstring(written, np.float64, sep=" ").reshape(-1, 3)
-    faces = np.arange(len(corners) // 3 * 3).reshape(-1, 3)
-    return RawMesh(title, corners, faces, lines=np.array(vertices)[: faces.size : 3] + 1)
+def _solid(name: str, title: str, lines: list[str], vertices: list[int]) -> RawMesh:
+    """Return a solid; trimesh sees neither its name, which may be a keyword, nor other lines."""
+    vertices = vertices[: len(vertices) // 3 * 3]
+    written = "\n".join(["solid", *(lines[at] for at in vertices), "endsolid"]).encode()
+    (mesh,) = geometries(name, "stl", written)
+    return RawMesh(title, mesh["vertices"], mesh["faces"], lines=np.array(vertices[::3]) + 1)
