@@ -33,11 +33,12 @@ from .layers import MOST_PRIMS, Layers, said, typed
 from .lights import LAMPS, Lamp, is_light, light_up
 from .materials import OPACITY, Materials
 from .meshes import Meshes
+from .skins import POSED, pose
 from .tints import DISPLAYED, Tint, grouped, has_own, outside
 from .values import is_even, mean_scale, value_of
 
 HEIGHT = 512  # pixels of the picture of a camera
-HARMLESS = ("Scope", "Xform", "Material", "Shader", "NodeGraph", "GeomSubset", "RenderSettings", "")
+HARMLESS = ("Scope", "Xform", "Material", "Shader", "NodeGraph", "GeomSubset", "RenderSettings", "", *POSED)
 
 
 def read_usd(files: SceneFiles, time: float | None = None) -> Contents:
@@ -74,7 +75,7 @@ class _Found:
 
 def _in_child(name: str, search_paths: tuple[Path, ...], limits: LoadLimits, time: float | None) -> _Found:
     """Return what a file holds, within the limits of its load."""
-    from pxr import Pcp, Usd, UsdGeom, UsdLux, UsdShade, UsdUtils  # noqa: F401 (they are not in the limit)
+    from pxr import Pcp, Usd, UsdGeom, UsdLux, UsdShade, UsdSkel, UsdUtils  # noqa: F401 (they are not in the limit)
 
     files = SceneFiles(name, search_paths, limits)
     files.budget.add_file(os.path.getsize(name))
@@ -159,6 +160,7 @@ class _Reader:
         )
         for error in self.stage.GetCompositionErrors():
             self.files.losses.note(said(error), "composition")
+        pose(self.stage, self.time, self.part)
         self.root = np.diag([self.unit] * 3 + [1.0])  # from the stage to the scene
         self._count(self.stage.GetPseudoRoot(), ())
         self._place(self.stage.GetPseudoRoot(), self.root[None], {})
