@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 import wavefront as wf
+from wavefront.codecs.images import write_image
 
 pytest.importorskip("pxr")
 SQUARE = """int[] faceVertexCounts = [4]
@@ -222,6 +223,49 @@ def test_readers_of_primvars_have_fallbacks(tmp_path: Path) -> None:
     look = paint("color3f inputs:diffuseColor.connect = </paint/r.outputs:result>", more=reader)
     (shape,) = load(tmp_path, look + board("rel material:binding = </paint>", "MaterialBindingAPI")).shapes
     np.testing.assert_allclose(shape.colors[:, :3], [[1, 0.5, 0]] * len(shape.colors))
+
+
+@pytest.mark.parametrize(
+    ("name", "scale", "bias", "shown"),
+    [("diffuseColor", 3, 0, 1.0), ("diffuseColor", 1, -1, 0.0), ("emissiveColor", 1, -1, 0.0)],
+)
+def test_textures_beyond_their_range_are_clamped(
+    tmp_path: Path, name: str, scale: float, bias: float, shown: float
+) -> None:
+    write_image(tmp_path / "a.png", np.full((2, 2, 3), 0.5, np.float32))
+    image = f"""def Shader "t"
+ {{
+ uniform token info:id = "UsdUVTexture"
+ asset inputs:file = @a.png@
+ float4 inputs:scale = ({scale}, {scale}, {scale}, 1)
+ float4 inputs:bias = ({bias}, {bias}, {bias}, 0)
+ float3 outputs:rgb
+ }}
+"""
+    look = paint(f"color3f inputs:{name}.connect = </paint/t.outputs:rgb>", more=image)
+    body = look + board("rel material:binding = </paint>", "MaterialBindingAPI")
+    with pytest.warns(UserWarning, match=rf"/paint/s: inputs:{name}, a texture, is .*; clamped to 0 to"):
+        (shape,) = load(tmp_path, body, strict=False).shapes
+    value = shape.emission if name == "emissiveColor" else shape.material.bsdf.base_color
+    assert value.limits()[0] >= 0
+    camera = wf.Camera.orthographic((1, 0.5, 5), (1, 0.5, 0), height=0.5, size=(2, 2))
+    lights = [] if name == "emissiveColor" else [wf.Environment(1)]
+    picture = wf.render(wf.Scene([shape], lights, camera), 4, aovs=("albedo",), progress=False)
+    seen = picture.rgb if name == "emissiveColor" else picture.albedo
+    np.testing.assert_allclose(seen, shown, atol=0.06)
+
+
+def test_a_texture_without_a_file_shows_its_fallback(tmp_path: Path) -> None:
+    image = """def Shader "t"
+ {
+ uniform token info:id = "UsdUVTexture"
+ float4 inputs:fallback = (0, 0.75, 0, 1)
+ float3 outputs:rgb
+ }
+"""
+    look = paint("color3f inputs:diffuseColor.connect = </paint/t.outputs:rgb>", more=image)
+    (shape,) = load(tmp_path, look + board("rel material:binding = </paint>", "MaterialBindingAPI")).shapes
+    np.testing.assert_allclose(np.ravel(shape.material.bsdf.base_color), [0, 0.75, 0])
 
 
 def test_materials_are_bound_for_purposes(tmp_path: Path) -> None:
