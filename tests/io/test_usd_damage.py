@@ -93,8 +93,13 @@ def test_colors_with_an_opacity(tmp_path: Path) -> None:
     [
         ("[2, 4], [0, 1, 0, 1, 2, 3]", "1 face of less than 3 corners; left out", 1),
         ("[4, 1, 0, -3], [0, 1, 2, 3, 0]", "3 faces of less than 3 corners; left out", 1),
-        ("[3, 3], [0, 1, 2, 0, 2, 9]", "faceVertexIndices has 9; there are 4 points; 1 face left out", 0.5),
+        ("[3, 3], [0, 1, 2, 0, 2, 9]", "faceVertexIndices has 9; there are 4 points; 1 face left", 0.5),
         ("[3, 3], [0, -1, 2, 0, 2, 3]", "faceVertexIndices has -1; there are 4 points; 1 face left out", 0.5),
+        (
+            "[4, 3], [0, 1, 2, 9, 0, 2, 3]",
+            "faceVertexIndices has 9; there are 4 points; 1 face left out",
+            0.5,
+        ),
         ("[3, 4], [0, 1, 2, 0, 2, 3]", "add up to 7 for 6 faceVertexIndices; 1 face and what", 0.5),
         ("[3], [0, 1, 2, 0, 2, 3]", "add up to 3 for 6 faceVertexIndices; 0 faces and what", 0.5),
     ],

@@ -10,6 +10,7 @@ import pytest
 
 import wavefront as wf
 from wavefront.codecs.images import write_image
+from wavefront.io.losses import Losses
 
 pytest.importorskip("pxr")
 SQUARE = """int[] faceVertexCounts = [4]
@@ -320,3 +321,17 @@ def test_subdivision_that_is_not_set_is_one_notice(tmp_path: Path) -> None:
         scene = load(tmp_path, body, strict=False)
     assert len(told) == 1
     assert scene.losses == ()
+
+
+def test_notices_are_no_errors_where_losses_are() -> None:
+    losses = Losses("a.usda", strict=True)
+    losses.notice("this", "/a", "shown so")
+    losses.report()
+    losses.note("that", "/a")
+    with pytest.raises(wf.SceneError, match=r"^a\.usda: not honored: /a: that$"):
+        losses.report()
+    losses = Losses("a.usda")
+    losses.notice("this", "/a", "shown so")
+    losses.notice("this", "/b", "shown so")
+    with pytest.warns(UserWarning, match=r"^a\.usda: /a: this; shown so$"):
+        losses.report()
