@@ -45,6 +45,30 @@ def test_off(write):
     assert len(mesh.faces) == 2
 
 
+STL = "solid\nvertex 0 0 0\nvertex 1 0 0\nvertex 1 1 0\nvertex 0 0 0\nvertex 1 1 0\nvertex 0 1 0\nendsolid\n"
+
+
+@pytest.mark.parametrize(
+    ("name", "data"),
+    [("a.off", OFF), ("a.off", OFF.replace("3 0 1 2", "3 0 1 2 9 9 9")), ("a.stl", STL)],
+)
+def test_trimesh_reads_triangles(write, monkeypatch, name, data):
+    loaders, kind = trimesh.exchange.load.mesh_loaders, name[2:]
+    read, seen = loaders[kind], []
+    monkeypatch.setitem(loaders, kind, lambda file: seen.append(kind) or read(file))
+    (mesh,) = load_meshes(write(data, name), materials=False)
+    assert seen == [kind]
+    assert np.array_equal(soup(mesh)[:, :, :2], [[[0, 0], [1, 0], [1, 1]], [[0, 0], [1, 1], [0, 1]]])
+
+
+@pytest.mark.parametrize("word", ["1_0", "1\0", "1.0.0"])
+def test_words_that_only_python_takes_for_numbers(write, word):
+    path = write(OFF.replace("0 1 0", f"0 {word} 0"), "a.off")
+    with pytest.warns(UserWarning, match="1 face with a vertex that is not finite"):
+        (mesh,) = load_meshes(path)
+    assert len(mesh.faces) == 1
+
+
 @pytest.mark.parametrize(
     ("data", "named"),
     [
