@@ -327,7 +327,7 @@ def main(seed, count):
 
 
 @pytest.mark.skipif(sys.platform != "linux", reason="memory limits as Linux has them")
-@pytest.mark.parametrize(("seed", "count"), [(0, 250), pytest.param(1, 20000, marks=pytest.mark.slow)])
+@pytest.mark.parametrize(("seed", "count"), [(0, 120), pytest.param(1, 20000, marks=pytest.mark.slow)])
 def test_damaged_files(seed, count):
     done = subprocess.run(
         [sys.executable, __file__, str(seed), str(count)], capture_output=True, text=True, errors="replace"
