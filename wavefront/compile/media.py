@@ -152,8 +152,13 @@ def crossed(stack: NDArray[Any], crossing: NDArray[Any]) -> NDArray[Any]:
         for each in crossing:
             stack = crossed(stack, each)
         return stack
-    if not crossing.any():
+    lanes = np.flatnonzero(crossing)
+    if not lanes.size:
         return stack
+    if lanes.size < crossing.size:
+        out = stack.copy()
+        out[:, lanes] = crossed(stack.take(lanes, 1), crossing.take(lanes))
+        return out
     enters = crossing > 0
     if (enters & (stack[-1] != 0)).any():
         warn_caller(f"paths are inside of more than {DEPTH} shapes; they forget the outermost")

@@ -33,6 +33,9 @@ def transmittance_along(scene: CompiledScene, rays: ShadowRays, absent: Bools | 
         if there is not None:
             part[:, lanes.compress(~there)] = 0
     lanes = np.flatnonzero(~seen)
+    if absent is None and not may_pass(scene):
+        part[:, lanes] = 0
+        return part
     rays = rays.take(lanes)
     while lanes.size:
         hits = intersect(scene, rays)
@@ -61,6 +64,11 @@ def transmittance_along(scene: CompiledScene, rays: ShadowRays, absent: Bools | 
         on = np.flatnonzero(left.max(0) != 0)
         lanes, rays = lanes.take(on), rays.take(on)
     return part
+
+
+def may_pass(scene: CompiledScene) -> bool:
+    """Return whether rays may pass any surface: by its alpha, or because a higher priority hides it."""
+    return scene.opacities is not None or (scene.media is not None and bool(scene.media.nested.any()))
 
 
 def passable(
