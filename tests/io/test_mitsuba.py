@@ -1488,3 +1488,17 @@ def plugin_table() -> str:
         if names:
             lines.append(f"- {kind}: {', '.join(names)}")
     return "\n".join(lines) + "\n"
+
+
+@pytest.mark.parametrize(("bsdf", "most"), [("principledthin", 1.4), ("diffuse", 1.0)])
+def test_fields_of_a_checkerboard_have_the_range_of_their_use(bsdf: str, most: float) -> None:
+    """`diff_trans` goes up to 2; a reflectance above 1 is clamped, with a word."""
+    board = {"type": "checkerboard", "color0": 0.2, "color1": 1.4}
+    name = "diff_trans" if bsdf == "principledthin" else "reflectance"
+    scene = {"type": "scene", "a": {"type": "sphere", "bsdf": {"type": bsdf, name: board}}}
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always")
+        made = wf.from_mitsuba(scene).shapes[0].material.bsdf
+    texture = made.diffuse_transmission if bsdf == "principledthin" else made.reflectance
+    assert max(texture.limits()) == pytest.approx(most)
+    assert len(caught) == (most == 1)

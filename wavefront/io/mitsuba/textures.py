@@ -249,7 +249,7 @@ def _board(node: Node, job: Job, channel: int | None = None) -> Texture:
     """Return four fields, of colors or of numbers; v from 0 to 1/2 is the upper row."""
     fields = []
     for name, default in (("color0", 0.4), ("color1", 0.2)):
-        value = color(node, name, default, job)
+        value = _field(node, name, default, job)
         if isinstance(value, BaseTexture):
             node.lose(f"the texture {name}")
             value = default
@@ -258,6 +258,11 @@ def _board(node: Node, job: Job, channel: int | None = None) -> Texture:
     if channel is not None:  # `Checkerboard::eval_1` has color0 where `eval` has color1
         board = luminance(board[::-1].transpose(2, 0, 1))
     return Texture(board, filter="nearest", transform=_to_uv(node), channel=channel)
+
+
+def _field(node: Node, name: str, default: float, job: Job) -> Value:
+    """Return a color as it is: what reads the texture knows its range."""
+    return node.or_default(default, lambda: as_color(_given(node, name, default, job), "albedo"))
 
 
 unsupported("volume", "texture")
