@@ -21,6 +21,8 @@ from wavefront.colors.spectrum import blackbody_spectrum, spectrum_rgb
 from wavefront.io.losses import Losses
 from wavefront.io.mitsuba import convert as _  # noqa: F401  fills the table
 from wavefront.io.mitsuba.nodes import PLUGINS, Node
+from wavefront.io.pbrt.shapes import facing
+from wavefront.io.repair import RawMesh
 from wavefront.sampling.filters import FILTERS as FILTERS_HERE
 
 OBJ = "v 0 0 0\nv 1 0 0\nv 0 1 0\nvt 0 0\nvt 1 0\nvt 0 1\nf 1/1 2/2 3/3\n"
@@ -1502,3 +1504,10 @@ def test_fields_of_a_checkerboard_have_the_range_of_their_use(bsdf: str, most: f
     texture = made.diffuse_transmission if bsdf == "principledthin" else made.reflectance
     assert max(texture.limits()) == pytest.approx(most)
     assert len(caught) == (most == 1)
+
+
+def test_a_mesh_with_normals_keeps_faces_of_vertices_that_do_not_exist_until_they_are_left_out() -> None:
+    """Its faces are turned to its normals before that."""
+    raw = facing(RawMesh("a", np.eye(3), np.array([[0, 1, 2], [0, 1, 99]]), np.ones((3, 3))), reverse=False)
+    assert raw.faces.shape == (2, 3)
+    assert raw.faces.max() == 99

@@ -1041,3 +1041,14 @@ def test_pictures_have_pbrts_brightness_and_sides(tmp_path: Path) -> None:
 def test_the_documentation_names_all_types() -> None:
     text = DOCS.read_text()
     assert [key for key in TABLE if f"`{key[1]}`" not in text] == []
+
+
+def test_a_surface_of_loops_may_have_vertices_without_faces(tmp_path) -> None:
+    path = tmp_path / "a.pbrt"
+    path.write_text(
+        'WorldBegin\nShape "loopsubdiv" "integer levels" 1 "integer indices" [0 1 2 0 2 9] '
+        '"point3 P" [0 0 0 1 0 0 1 1 0 0 1 0]\n'
+    )
+    with pytest.warns(UserWarning, match="face with a vertex that does not exist"):
+        scene = wf.load(path)
+    assert len(scene.shapes[0].faces) == 4

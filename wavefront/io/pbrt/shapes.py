@@ -111,9 +111,11 @@ def _loop(entity: Entity, job: Job) -> RawMesh:
     entity.harmless("scheme")
     raw, levels = _arrays(entity, 3), entity.whole("levels", 3, 0, 16)
     job.files.limits.check_triangles(entity.label, len(raw.faces) * 4**levels)
+    used, faces = np.unique(raw.faces, return_inverse=True)  # trimesh refuses vertices without faces
+    subdivided = import_trimesh().remesh.subdivide_loop
     try:
-        vertices, faces = import_trimesh().remesh.subdivide_loop(raw.vertices, raw.faces, levels)
-    except (ValueError, IndexError) as error:
+        vertices, faces = subdivided(raw.vertices[used], faces.reshape(-1, 3), levels)
+    except (ValueError, IndexError, AssertionError) as error:
         raise SceneError(f"cannot be subdivided: {error}") from error
     return RawMesh("loopsubdiv", vertices, faces, smooth=True)
 
@@ -272,13 +274,17 @@ def _area(raw: RawMesh) -> float:
 
 
 def facing(raw: RawMesh, reverse: bool) -> RawMesh:
-    """Return a mesh whose faces have their fronts where its normals are; `reverse` is ReverseOrientation."""
+    """Return a mesh whose faces have their fronts where its normals are; `reverse` is ReverseOrientation.
+
+    Faces of vertices that do not exist turn anyhow; `build` leaves them out.
+    """
     faces, normals = raw.faces, raw.normals
     if normals is not None:
         ahead = np.empty(len(faces), np.bool_)
         for part in spans(len(faces), AT_ONCE):
-            a, b, c = (np.ascontiguousarray(raw.vertices.take(each, 0).T) for each in faces[part].T)
-            mean = normals.take(faces[part], 0).sum(1).T
+            corners = (raw.vertices.take(each, 0, mode="clip") for each in faces[part].T)
+            a, b, c = (np.ascontiguousarray(each.T) for each in corners)
+            mean = normals.take(faces[part], 0, mode="clip").sum(1).T
             ahead[part] = dot(cross(b - a, c - a), mean) >= 0
         if not ahead.all():
             faces = np.where(ahead[:, None], faces, faces[:, ::-1])
