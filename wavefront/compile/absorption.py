@@ -1,16 +1,16 @@
-"""Whether what absorbs in a scene needs no table of media.
+"""Whether the media of a scene that only absorb need no `MediaTable`.
 
-A ray that meets the back side of a surface has crossed what is behind it. So if nothing begins, ends or is
-inside of an absorber, its light may be weakened where a ray meets it from behind, and nothing else needs to
-know of it. That holds for a glass ball, a prism or a bottle by itself. It holds for cameras and sensors
-inside, too: all that they see has come through the boundary. It holds for
+A ray that meets a surface from its back side has crossed the medium behind it. Where no path begins, ends or
+scatters within that medium, it is enough to attenuate rays there: they need no record of the media that they
+are in. That is so for a glass ball, a prism or a bottle by itself. The conditions for an absorbing shape are:
 
-- a closed boundary with two faces at each edge, which turns its front outside, of parts that are apart,
-- which does not shine,
-- and whose box holds no part of another shape and no light that has a place.
+- It is closed, with two faces at each edge, and its front is outside. Connected parts do not overlap.
+- It does not emit.
+- Its bounding box contains no part of another shape, and no light that has a position.
 
-A shape that stands on a flat side of an absorber is held by it, as rays meet both sides at one distance. What
-only touches the box is not. A boundary that crosses itself within one connected part is not noticed.
+Cameras and sensors may be inside, since every ray that they trace leaves through the surface. A shape that
+lies on a flat side counts as inside, because rays hit both at one distance; one that only touches the box
+does not. A connected surface that intersects itself is not detected.
 """
 
 from __future__ import annotations
@@ -26,6 +26,7 @@ from ..lights import Light
 from ..lights.base import FarLight
 from ..shapes import Cylinders, Instance, Mesh, Shape, Sphere
 from ..shapes.instance import instance_bounds
+from .geometry import boxes_of_groups
 
 NEAR = 1e-6  # what counts as touching, relative to the size of a box
 MOST_PARTS = 1 << 11  # of absorbers, beyond which the table is taken without a search
@@ -133,9 +134,7 @@ def _volumes(corners: Doubles, part_of: Ints, parts: int) -> Doubles:
 def _boxes_of_parts(corners: Doubles, part_of: Ints, parts: int) -> tuple[Doubles, Doubles]:
     """Return the boxes (parts, 3) of triangles (m, 3, 3), larger on flat sides and smaller on others."""
     least, most = corners.min(1), corners.max(1)
-    low, high = np.full((parts, 3), np.inf), np.full((parts, 3), -np.inf)
-    np.minimum.at(low, part_of, least)
-    np.maximum.at(high, part_of, most)
+    low, high = boxes_of_groups(least, most, part_of, parts)
     room = NEAR * (high - low).max(1, keepdims=True)
     flat_low, flat_high = np.zeros((parts, 3), np.bool_), np.zeros((parts, 3), np.bool_)
     np.logical_or.at(flat_low, part_of, most <= (low + room).take(part_of, 0))

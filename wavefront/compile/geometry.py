@@ -12,6 +12,14 @@ from ..shapes import Mesh
 AT_ONCE = 1 << 14  # triangles that are made in float64 together, so that they fit the cache
 
 
+def boxes_of_groups(low: Doubles, high: Doubles, group: Ints, count: int) -> tuple[Doubles, Doubles]:
+    """Return the corners (count, 3) of the boxes of groups (m,), given those (m, 3) of their members."""
+    lows, highs = np.full((count, 3), np.inf), np.full((count, 3), -np.inf)
+    np.minimum.at(lows, group, low)
+    np.maximum.at(highs, group, high)
+    return lows, highs
+
+
 def same_as_next(*of_triangles: Ints) -> Bools:
     """Return a mask (m,) of the triangles that have the same numbers (m,) as the next one."""
     same = np.zeros(of_triangles[0].size, np.bool_)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from typing import Any
 
 import numpy as np
@@ -167,6 +167,22 @@ def crossed(stack: NDArray[Any], crossing: NDArray[Any]) -> NDArray[Any]:
     return np.where(enters, shifted, out)
 
 
+def stacks_leaving(stack: NDArray[Any], crossing: NDArray[Any], cos: Floats) -> NDArray[Any]:
+    """Return the stacks (4, n) of rays that leave surfaces.
+
+    Parameters
+    ----------
+    stack
+        (4, n) of the rays that have come.
+    crossing
+        (k, n) what crossing the surfaces does to stacks.
+    cos
+        (n,) cosine between the rays and the normal on the side from which the others came: they cross the
+        surfaces where it is below 0.
+    """
+    return crossed(stack, np.where(cos < 0, crossing, ENTRY(0)))
+
+
 def without(stack: NDArray[Any], entry: NDArray[Any]) -> NDArray[Any]:
     """Return stacks (4, n) without the last of these entries (n,) that was put there."""
     out, gone = np.empty_like(stack), np.zeros(entry.size, np.bool_)
@@ -177,7 +193,9 @@ def without(stack: NDArray[Any], entry: NDArray[Any]) -> NDArray[Any]:
     return out
 
 
-def media_of(materials: Sequence[Material], around: BaseMedium | None, alone: bool) -> list[BaseMedium]:
+def media_of(
+    materials: Sequence[Material], around: BaseMedium | None, alone: Callable[[], bool]
+) -> list[BaseMedium]:
     """Return the distinct media that need a `MediaTable`; none where absorption behind surfaces is all.
 
     Parameters
@@ -187,12 +205,12 @@ def media_of(materials: Sequence[Material], around: BaseMedium | None, alone: bo
     around
         The medium of the scene.
     alone
-        Whether each absorber is alone (compile/absorption.py).
+        Says whether each absorber is alone (compile/absorption.py); asked where nothing else needs a table.
     """
     inside = [material.interior for material in materials if material.interior is not None]
     needed = around is not None or any(material.priority is not None for material in materials)
     varied = any(each.scatters or each.glows or each.bounds is not None for each in inside)
-    if alone and not needed and not varied:
+    if not needed and not varied and alone():
         return []
     return list({id(medium): medium for medium in [*inside, *([] if around is None else [around])]}.values())
 

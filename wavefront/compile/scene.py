@@ -165,7 +165,7 @@ def compile_scene(
     triangles, normals = gather_triangles(meshes, vertices)
     user_materials, material_of, replaced = number_materials(meshes, curved, instances)
     around = None if scene.medium is None else scene.medium.scaled(scale)
-    filled = media_of(user_materials, around, absorbs_alone(placed, scene.lights, scale))
+    filled = media_of(user_materials, around, lambda: absorbs_alone(placed, scene.lights, scale))
     media = media_table(around, placed, user_materials, filled, center)
     glowing, of_media = glow_lights(media)
     phases = phase_materials(filled)

@@ -14,6 +14,7 @@ from ..accel.numpy_accel import NumpyAccelerator
 from ..accel.triangle import has_area, triangle_table
 from ..arrays.soa import soa
 from ..arrays.vec import Bools, Doubles, Floats, Ints, f4, length
+from .geometry import boxes_of_groups
 
 FEW = 1 << 12  # triangles that are all compared, also with those of their own shape
 MOST_SHAPES = 1 << 8  # whose boxes are compared with each other; of more, all faces are
@@ -91,18 +92,10 @@ def _near_others(triangles: Floats, shape: Ints) -> Bools:
         return np.zeros(shape.size, np.bool_)
     if names.size > MOST_SHAPES:
         return np.ones(shape.size, np.bool_)
-    lows, highs = _boxes(low, high, of_shape, names.size)
+    lows, highs = boxes_of_groups(low, high, of_shape, names.size)
     near = np.zeros(shape.size, np.bool_)
     for other in range(names.size):
         room = ROOM * max(float(np.abs(lows[other]).max()), float(np.abs(highs[other]).max()))
         meets = ((low <= highs[other] + room) & (high >= lows[other] - room)).all(1)
         near |= meets & (of_shape != other)
     return near
-
-
-def _boxes(low: Doubles, high: Doubles, of_shape: Ints, count: int) -> tuple[Doubles, Doubles]:
-    """Return the corners (count, 3) of the boxes of shapes, given those (m, 3) of their triangles."""
-    lows, highs = np.full((count, 3), np.inf), np.full((count, 3), -np.inf)
-    np.minimum.at(lows, of_shape, low)
-    np.maximum.at(highs, of_shape, high)
-    return lows, highs

@@ -28,7 +28,7 @@ from ..arrays.soa import soa
 from ..arrays.state import Hits, Paths, Rays, SoA, SurfaceInteraction, Words
 from ..arrays.vec import Bools, Doubles, Floats, Ints, broadcast, dot, f4, highest, length, take
 from ..camera import Camera
-from ..compile.media import ENTRY, crossed
+from ..compile.media import stacks_leaving
 from ..compile.scene import CompiledScene
 from ..compile.specular_surfaces import SpecularPoints, SpecularSurfaces
 from ..lights import LightSample
@@ -269,8 +269,8 @@ def _around(shade: Shading, paths: Paths, lanes: Ints, wo: Floats) -> Any:
     """Return the stacks (4, k) of light that leaves some lanes along wo (3, k); None where there are none."""
     if paths.media is None:
         return None
-    below = dot(take(shade.surface.ng, lanes), wo) < 0
-    return crossed(take(paths.media, lanes), np.where(below, take(shade.crossing, lanes), ENTRY(0)))
+    cos = dot(take(shade.surface.ng, lanes), wo)
+    return stacks_leaving(take(paths.media, lanes), take(shade.crossing, lanes), cos)
 
 
 def _towards(scene: CompiledScene, hits: Hits, point: Floats, wo: Floats, wi: Floats, stack: Any) -> Floats:

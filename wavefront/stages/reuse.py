@@ -40,7 +40,7 @@ from ..arrays.vec import (
     spans,
     take,
 )
-from ..compile.media import ENTRY, crossed
+from ..compile.media import stacks_leaving
 from ..compile.scene import CompiledScene
 from ..sampling.tiles import MEMBERS, WaveTiles
 from .glossy_points import SECTIONS, GlossyPoints, glossy_materials
@@ -368,8 +368,8 @@ class FirstPoints:
         media = take(self.media, lanes)
         if self.shade is None:  # rays leave on the side from which the paths came
             return media
-        below = dot(take(self.shade.surface.ng, lanes), direction) < 0
-        return crossed(media, np.where(below, take(self.crossing, lanes), ENTRY(0)))
+        cos = dot(take(self.shade.surface.ng, lanes), direction)
+        return stacks_leaving(media, take(self.crossing, lanes), cos)
 
 
 @soa

@@ -14,7 +14,7 @@ from ..arrays.state import Contribution, Hits, Paths, SurfaceInteraction
 from ..arrays.vec import ALL, TINY, Floats, Ints, Lanes, broadcast, column, dot, f4, highest, take
 from ..bsdfs import Bsdf, albedo_of, evaluated
 from ..compile.materials import MaterialTable
-from ..compile.media import ENTRY, crossed
+from ..compile.media import stacks_leaving
 from ..compile.scene import CompiledScene
 from ..guiding import GuideTable
 from ..lights import LightSample, Receiver
@@ -121,7 +121,7 @@ class Shading:
         """Return the stacks (4, n) of rays that leave, given those of paths that come; see `cosines`."""
         if media is None or self.crossing is None:
             return media
-        return crossed(media, np.where(cos_g < 0, self.crossing, ENTRY(0)))
+        return stacks_leaving(media, self.crossing, cos_g)
 
     def unshadowed(self, world: Floats) -> Floats:
         """Return the part (n,) of light along world directions (3, n) that tilted normals do not shadow.
