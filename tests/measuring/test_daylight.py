@@ -294,3 +294,17 @@ def test_products_of_matrices() -> None:
     rng = np.random.default_rng(0)
     a, b = rng.random((4, 7)), rng.random((7, 5))
     np.testing.assert_allclose(product(a, b), a @ b, rtol=1e-12)
+
+
+@pytest.mark.parametrize("held", [False, True], ids=["alone", "with a stone in it"])
+def test_water_above_dims_the_sun_of_each_hour(held: bool) -> None:
+    """By exp(−σ·length) on the slanted way, whether or not paths store what they are inside of."""
+    sigma, up = np.array([0.3, 1.0, 2.0]), np.array([0.3, 1, 0.2]) / np.linalg.norm([0.3, 1, 0.2])
+    water = wf.Material(wf.NullSurface(), interior=wf.Medium(sigma))
+    shapes = [wf.Box((0, 1.5, 0), (40, 1, 40), material=water)]
+    if held:
+        shapes.append(wf.Sphere((15, 1.5, 15), 0.2, material=wf.Diffuse(0)))
+    hour = wf.Weather([900], [1e-6], [up])
+    beam = coefficients(wf.Scene(shapes), spp=64).sunlight(hour)[0, 0]
+    through = np.array([0.2126, 0.7152, 0.0722]) @ np.exp(-sigma / up[1])
+    assert beam == pytest.approx(900 * up[1] * through, rel=1e-3)
