@@ -1,4 +1,4 @@
-"""The analytical cases of CIE 171:2006, measured: the table of docs/cie171.md.
+"""The analytical cases of CIE 171:2006, measured: the table of docs/record/cie171.md.
 
 python benchmarks/cie171.py [case ...] [--spp 32768] [--skies 16]
 

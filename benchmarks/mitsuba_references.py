@@ -1,6 +1,6 @@
 """Mitsuba's test scenes, rendered here and compared with the reference pictures that come with them.
 
-    python benchmarks/mitsuba_references.py FOLDER [--page docs/mitsuba_references.md] [--only spheres]
+    python benchmarks/mitsuba_references.py FOLDER [--page docs/record/mitsuba_references.md] [--only spheres]
 
 FOLDER is a checkout of https://github.com/mitsuba-renderer/mitsuba-data. Each scene of its `tests/scenes` has
 a picture of 32 000 samples per pixel, and the variance. Needs `mitsuba` (extra `[bench]`), which renders each

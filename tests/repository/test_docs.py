@@ -14,7 +14,13 @@ import pytest
 import wavefront as wf
 
 ROOT = Path(__file__).parents[2]
-PAGES = sorted([*(ROOT / "docs").glob("*.md"), *(ROOT / "docs" / "how_to").glob("*.md")])
+PAGES = sorted(
+    [
+        *(ROOT / "docs").glob("*.md"),
+        *(ROOT / "docs" / "how_to").glob("*.md"),
+        *(ROOT / "docs" / "record").glob("*.md"),
+    ]
+)
 DOCUMENTS = [ROOT / "README.md", ROOT / "CONTRIBUTING.md", *PAGES]
 TUTORIAL = sorted((ROOT / "docs" / "tutorial").glob("[0-9]*.py"))
 TRACER = ROOT / "docs" / "tutorial" / "tracer.py"
@@ -165,12 +171,12 @@ def test_links_lead_somewhere(document):
 
 
 def test_files_named_in_the_documents_exist():
-    """But for the appendices, which name files of their time."""
+    """But for the records, which name files of their time."""
     files = {f"/{path.relative_to(ROOT).as_posix()}" for path in ROOT.glob("[!.]*/**/*.py")}
     for document in DOCUMENTS:
         for name in re.findall(r"`([\w/]+\.py)`", document.read_text("utf-8")):
             found = any(file.endswith(f"/{name}") for file in files)
-            assert found or document.name.startswith("appendix_"), f"{document.name}: {name}"
+            assert found or document.parent.name == "record", f"{document.name}: {name}"
 
 
 def test_the_index_lists_every_document():
