@@ -12,7 +12,7 @@ from wavefront.accel import Geometry
 from wavefront.accel.distance_grid import DistanceGridPrimitives, _first_root
 from wavefront.accel.numpy_accel import NumpyAccelerator
 from wavefront.arrays.state import Rays
-from wavefront.compile.scene import compile_scene
+from wavefront.features.compiling import compile_scene
 from wavefront.stages.interaction import interaction, offset_origin
 from wavefront.stages.intersect import intersect
 

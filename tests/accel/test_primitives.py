@@ -20,7 +20,7 @@ from wavefront.accel.numpy_accel import NumpyAccelerator
 from wavefront.accel.primitives import CurvedPrimitives
 from wavefront.accel.sphere import SpherePrimitives
 from wavefront.arrays.state import Hits, Rays
-from wavefront.compile.scene import compile_scene
+from wavefront.features.compiling import compile_scene
 from wavefront.stages.interaction import interaction
 
 f4 = np.float32

@@ -13,7 +13,7 @@ from rays import PLACES, aimed_rays, brute_force, check_batches, geometry, nothi
 import wavefront as wf
 from wavefront.accel import Accelerator, Geometry, make_accelerator
 from wavefront.accel.quads import are_parallelograms, corners, find_quads
-from wavefront.compile.scene import compile_scene
+from wavefront.features.compiling import compile_scene
 
 f4 = np.float32
 SQUARE = np.array([(0.0, 0, 0), (1, 0, 0), (1, 1, 0), (0, 1, 0)])

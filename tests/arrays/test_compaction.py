@@ -17,7 +17,8 @@ from wavefront.accel.numpy_accel import NumpyAccelerator
 from wavefront.arrays.frame import Frame
 from wavefront.arrays.state import Hits, Paths, SurfaceInteraction
 from wavefront.arrays.vec import broadcast, f4, normalize
-from wavefront.compile.scene import ROULETTE_AFTER, CompiledScene, compile_scene
+from wavefront.compile.scene import ROULETTE_AFTER, CompiledScene
+from wavefront.features.compiling import compile_scene
 from wavefront.sampling.sampler import make_sampler
 from wavefront.stages import compact as stage
 from wavefront.stages.shade import shading

@@ -8,7 +8,7 @@ from significance import ALPHA, Mean, render
 
 import wavefront as wf
 from wavefront.accel import make_accelerator
-from wavefront.compile.scene import compile_scene
+from wavefront.features.compiling import compile_scene
 from wavefront.sampling.sampler import make_sampler
 from wavefront.stages.bounce import bounce_sample
 from wavefront.stages.generate import generate

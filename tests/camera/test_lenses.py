@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 import wavefront as wf
 from wavefront.arrays.vec import f4, length
 from wavefront.camera import Orthographic, Panorama, Perspective
-from wavefront.compile.scene import compile_scene
+from wavefront.features.compiling import compile_scene
 from wavefront.sampling.sampler import make_sampler
 from wavefront.stages.generate import generate
 

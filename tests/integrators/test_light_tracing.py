@@ -17,8 +17,11 @@ from significance import ALPHA, smallest_p
 
 import wavefront as wf
 from wavefront.arrays.vec import f4
-from wavefront.compile.scene import CompiledScene, compile_scene
+from wavefront.compile.program import Program
+from wavefront.compile.scene import CompiledScene
 from wavefront.compile.specular_surfaces import SpecularSurfaces
+from wavefront.features.background import Background
+from wavefront.features.compiling import compile_scene
 from wavefront.integrators import li_full
 from wavefront.integrators.light_tracing import Splats, trace_light
 from wavefront.sampling.sampler import Sampler, SobolSampler
@@ -687,7 +690,9 @@ def test_sky_light_stays_as_it_is(background) -> None:
     hidden = [box((-1, 3, -1), (1, 4, 1), WHITE), wf.Sphere((0, 3.5, 0), 0.2, emission=1.0)]
     scene = wf.Scene([*scene.shapes, *hidden], scene.lights, CAMERA)
     split, plain = (Tracer.of(scene, caustics) for caustics in (True, False))
-    split.scene.background = plain.scene.background = background
+    if background is not None:
+        for tracer in (split, plain):
+            tracer.scene.program = Program([*tracer.scene.program.features, Background(background)])
     assert split.scene.specular_surfaces is not None
     np.testing.assert_array_equal(split.eye(1, 8, 7), plain.eye(1, 8, 7))
     assert not len(split.splats(1, 8, 7))

@@ -10,7 +10,7 @@ from significance import Mean, assert_mean, assert_same_images, render, repeat
 
 import wavefront as wf
 from wavefront.accel import make_accelerator
-from wavefront.compile.scene import compile_scene
+from wavefront.features.compiling import compile_scene
 from wavefront.integrators import li_reuse
 from wavefront.sampling.sampler import SobolSampler
 from wavefront.sampling.tiles import PictureTiles, others_in_tile, place_in_tiles

@@ -15,7 +15,7 @@ from hypothesis import strategies as st
 import wavefront as wf
 from wavefront.accel import make_accelerator
 from wavefront.arrays.state import Paths, SurfaceInteraction
-from wavefront.compile.scene import compile_scene
+from wavefront.features.compiling import compile_scene
 from wavefront.guiding.cells import GuideCells
 from wavefront.guiding.guide_table import GuideTable
 from wavefront.sampling.tiles import MEMBERS as MEMBERS_OF_TILES

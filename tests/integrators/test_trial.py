@@ -15,7 +15,7 @@ from scenes import cornell_box, everything, room
 
 import wavefront as wf
 from wavefront.accel.counter import RayCounter
-from wavefront.compile.scene import compile_scene
+from wavefront.features.compiling import compile_scene
 from wavefront.integrators import li_full
 from wavefront.integrators import tuning as trial
 from wavefront.integrators.tuning import Run, Trial, TrialJob, TrialPart, li_twins

@@ -14,7 +14,7 @@ from wavefront.arrays.vec import f4
 from wavefront.codecs.display import Display
 from wavefront.codecs.encoding import srgb_to_linear
 from wavefront.codecs.images import write_image
-from wavefront.compile.scene import compile_scene
+from wavefront.features.compiling import compile_scene
 from wavefront.lights import ConstantEnvironment, EnvironmentSum
 
 ORIGIN = np.zeros(3)

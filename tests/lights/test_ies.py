@@ -14,7 +14,7 @@ import wavefront as wf
 from wavefront import testing
 from wavefront.accel import make_accelerator
 from wavefront.arrays.vec import f4
-from wavefront.compile.scene import compile_scene
+from wavefront.features.compiling import compile_scene
 from wavefront.lights import IESLights
 
 ORIGIN = np.zeros(3)

@@ -13,7 +13,7 @@ import wavefront as wf
 from wavefront import testing
 from wavefront.accel.numpy_accel import NumpyAccelerator
 from wavefront.arrays.vec import f4
-from wavefront.compile.scene import compile_scene
+from wavefront.features.compiling import compile_scene
 from wavefront.lights import EnvironmentSum, LightRecord, Receiver
 from wavefront.lights.product import NO_NORMAL, CosineProduct, octahedral_bins, octahedral_normals
 

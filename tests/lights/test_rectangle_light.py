@@ -6,7 +6,7 @@ import pytest
 import wavefront as wf
 from wavefront.accel import make_accelerator
 from wavefront.arrays.vec import f4
-from wavefront.compile.scene import compile_scene
+from wavefront.features.compiling import compile_scene
 from wavefront.lights import RectangleLights, TriangleLights, TwoSidedRectangleLights, first_of_pairs
 
 WHITE = np.ones((3, 1), f4)

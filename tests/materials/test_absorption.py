@@ -5,7 +5,7 @@ import pytest
 
 import wavefront as wf
 from wavefront.accel import make_accelerator
-from wavefront.compile.scene import compile_scene
+from wavefront.features.compiling import compile_scene
 
 ABSORPTION = np.array([0.2, 1.0, 3.0])
 

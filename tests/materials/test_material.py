@@ -8,7 +8,8 @@ from significance import render
 
 import wavefront as wf
 from wavefront.accel import make_accelerator
-from wavefront.compile.scene import CompiledScene, compile_scene
+from wavefront.compile.scene import CompiledScene
+from wavefront.features.compiling import compile_scene
 
 TRIANGLE = (np.eye(3), [[0, 1, 2]])
 CAMERA = wf.Camera.look_at((0, 0, 5), (0, 0, 0), fov=30, size=(8, 8))

@@ -10,7 +10,7 @@ from scenes import ALL
 
 import wavefront as wf
 from wavefront.accel import make_accelerator
-from wavefront.compile.scene import compile_scene
+from wavefront.features.compiling import compile_scene
 
 SIZE = (12, 12)
 UNSEEN = wf.Material(wf.Diffuse(0.3), visible_to_camera=False)

@@ -11,7 +11,7 @@ import scenes
 
 import wavefront as wf
 from wavefront.compile.brightest import brightest_emitter
-from wavefront.compile.scene import compile_scene
+from wavefront.features.compiling import compile_scene
 from wavefront.film.aov_names import BRIGHTEST, NARROW
 
 QUIET: dict[str, Any] = {"progress": False, "workers": 1}

@@ -14,7 +14,7 @@ import wavefront as wf
 from wavefront.accel import make_accelerator
 from wavefront.compile import absorption
 from wavefront.compile import scene as compiling
-from wavefront.compile.scene import compile_scene
+from wavefront.features.compiling import compile_scene
 
 ALL = ("naive", "direct_simple", "direct_mis", "full")
 MIRRORED = np.diag([-1.0, 1, 1, 1])

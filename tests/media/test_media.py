@@ -391,7 +391,7 @@ def test_light_groups_of_emission() -> None:
 
 def test_scenes_without_scattering_need_no_table() -> None:
     from wavefront.accel import make_accelerator
-    from wavefront.compile.scene import compile_scene
+    from wavefront.features.compiling import compile_scene
 
     for interior in (None, wf.Medium(2.0), wf.Medium()):
         scene = wf.Scene(ball(interior, bsdf=wf.Dielectric()), wf.Environment(1))

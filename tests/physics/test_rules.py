@@ -17,7 +17,8 @@ from wavefront.accel.brute_force import BruteForceTriangles
 from wavefront.accel.numpy_accel import SMALL
 from wavefront.arrays.vec import luminance
 from wavefront.compile.scale import MAX_DISTANCE
-from wavefront.compile.scene import CompiledScene, compile_scene
+from wavefront.compile.scene import CompiledScene
+from wavefront.features.compiling import compile_scene
 from wavefront.lights import PatchedEnvironment, SkyPatches
 from wavefront.lights.image import LEAST_VARIANCE
 from wavefront.lights.triangle import FEW

@@ -11,7 +11,7 @@ import wavefront as wf
 from wavefront.accel import make_accelerator
 from wavefront.arrays.vec import f4
 from wavefront.compile.materials import group_materials
-from wavefront.compile.scene import compile_scene
+from wavefront.features.compiling import compile_scene
 
 NAN, INF = np.nan, np.inf
 TRIANGLE = {"vertices": [[0, 0, 0], [1, 0, 0], [0, 1, 0]], "faces": [[0, 1, 2]]}

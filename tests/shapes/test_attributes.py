@@ -6,7 +6,7 @@ from significance import render
 
 import wavefront as wf
 from wavefront.accel import make_accelerator
-from wavefront.compile.scene import compile_scene
+from wavefront.features.compiling import compile_scene
 from wavefront.textures.base import BaseTexture
 
 SQUARE = {"vertices": [[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]], "faces": [[0, 1, 2], [0, 2, 3]]}

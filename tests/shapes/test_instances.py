@@ -18,7 +18,8 @@ from wavefront.accel import instances as queries
 from wavefront.accel.embree import installed
 from wavefront.arrays.state import Rays
 from wavefront.arrays.vec import dot
-from wavefront.compile.scene import CompiledScene, compile_scene
+from wavefront.compile.scene import CompiledScene
+from wavefront.features.compiling import compile_scene
 from wavefront.shapes.instance import can_place, instance_bounds
 from wavefront.stages.interaction import interaction
 from wavefront.stages.intersect import intersect

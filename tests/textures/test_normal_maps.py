@@ -11,7 +11,7 @@ from significance import Mean, assert_same_images, render, repeat
 import wavefront as wf
 from wavefront.accel import make_accelerator
 from wavefront.arrays.state import Hits, Rays
-from wavefront.compile.scene import compile_scene
+from wavefront.features.compiling import compile_scene
 from wavefront.stages.interaction import interaction
 from wavefront.stages.intersect import intersect
 from wavefront.stages.normal_mapping import ensure_valid_reflection, mirror_hidden, perturb_normals

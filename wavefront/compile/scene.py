@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import replace
+from collections.abc import Callable, Mapping
+from dataclasses import field, replace
+from typing import Any
 
 import numpy as np
 
@@ -11,7 +12,7 @@ from ..accel import Accelerator, Geometry, InstanceAccelerator
 from ..arrays.soa import soa
 from ..arrays.vec import Bools, Doubles, Floats, Ints
 from ..camera import Camera
-from ..lights import InfiniteLight, LightTable
+from ..lights import LightTable
 from ..lights.choice import LightSamplerMaker
 from ..scene import Scene
 from ..shapes import Shape
@@ -21,7 +22,7 @@ from .curved import CurvedTable
 from .geometry import compute_corner_normals, gather_triangles, same_as_next
 from .instances import InstanceTable, own_frame, place_instances, sort_shapes
 from .light_groups import BY_DEFAULT, LightGroups
-from .lights import find_backdrop, gather_lights
+from .lights import gather_lights
 from .materials import (
     MaterialTable,
     Opacities,
@@ -37,6 +38,7 @@ from .materials import (
 )
 from .media import MediaTable, glow_lights, media_of, media_table, phase_materials
 from .morton import MortonGrid
+from .program import Facts, Program
 from .scale import check_distance, check_lights, length_factor, scaled_shapes
 from .shape_numbers import ShapeNumbers, number_shapes
 from .specular_surfaces import SpecularSurfaces, find_specular_surfaces
@@ -81,11 +83,10 @@ class CompiledScene:
     places: MortonGrid | None = None  # orders the paths of large scenes; None in small ones
     shadow_catchers: Bools | None = None  # (materials,) those that catch shadows; None when none does
     unseen: Bools | None = None  # (materials,) those that camera rays pass; None when there are none
-    background: Floats | None = None  # (3, 1) what camera rays that miss show; None for the environment
-    backdrop: InfiniteLight | None = None  # what they show of the environment; None for all of its light
     roulette_after: float = ROULETTE_AFTER  # scattering events before Russian roulette may end paths
     specular_surfaces: SpecularSurfaces | None = None  # for light tracing; None without it
     media: MediaTable | None = None  # None where none are, or each absorbs alone (absorption.py)
+    program: Program = field(default_factory=Program)  # its features, and where they act
 
     @property
     def interpolates(self) -> bool:
@@ -112,18 +113,19 @@ class CompiledScene:
         """Return the scene as the first rays of a camera meet it: sensors measure the light that is there."""
         if camera.sensor is None:
             return self
-        return replace(self, unseen=None, shadow_catchers=None, background=None, backdrop=None)
+        return replace(self, unseen=None, shadow_catchers=None, program=self.program.of_sensors())
 
 
-def compile_scene(
+def gather_scene(
     scene: Scene,
     make_accelerator: Callable[[Geometry], Accelerator],
     light_sampler: str | LightSamplerMaker = "spatial",
     most_copies: int = 0,
     mis: bool = False,
     caustics: bool = False,
-) -> CompiledScene:
-    """Gather a scene into flat arrays.
+    asked: Mapping[str, Any] | None = None,
+) -> Facts:
+    """Gather a scene into flat arrays, and return these with what features decide by.
 
     Parameters
     ----------
@@ -139,6 +141,8 @@ def compile_scene(
         Whether light samples are combined with BSDF samples by MIS. Environments then use MIS compensation.
     caustics
         Whether paths from lights find the light that comes by smooth glass and mirrors.
+    asked
+        Settings that features read.
 
     Raises
     ------
@@ -217,7 +221,7 @@ def compile_scene(
                 efficacies.with_light(BY_DEFAULT.efficacy),
             )
     light_of = np.append(light_of, environment)
-    return CompiledScene(
+    compiled = CompiledScene(
         scale=scale,
         center=center,
         accelerator=accelerator,
@@ -238,7 +242,6 @@ def compile_scene(
         light_groups=groups,
         light_efficacies=efficacies,
         nonscattering_lights=nonscattering_lights,
-        backdrop=find_backdrop(scene, scale, center),
         instances=table,
         shadow_catchers=find_shadow_catchers(user_materials),
         unseen=find_unseen(user_materials),
@@ -246,3 +249,4 @@ def compile_scene(
         media=media,
         places=MortonGrid.over((high - low) / 2) if len(triangles) >= LARGE else None,
     )
+    return Facts(scene, compiled, user_materials, has_alpha, asked or {}, [])

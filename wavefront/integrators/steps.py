@@ -10,11 +10,11 @@ import numpy as np
 from ..aovs.path_recorder import MetSurfaces
 from ..arrays.state import Contribution, Hits, Paths
 from ..arrays.vec import Floats, Ints, add_to_slots, f4, highest, take
+from ..compile.program import Leg
 from ..compile.scene import CompiledScene
 from ..guiding import GuideTable
 from ..sampling.sampler import Sampler
 from ..stages.alpha import alpha_pass_through
-from ..stages.background import show_background
 from ..stages.bounce import branch, copies
 from ..stages.compact import compact, roulette, scattering_lanes, select
 from ..stages.guidance import guide
@@ -43,20 +43,24 @@ def intersect_and_compact(
     """
     if paths.sensor is not None:
         return paths, at_sensors(paths)
-    hits, left = intersect(scene, paths), paths.exclude_prim
-    paths, hits = alpha_pass_through(scene, paths, hits, sampler, bounce, mis)
-    if paths.glow is not None:
-        paths = collect_glow(L, paths)
-    emission = without_caustics(scene, paths, left, hits, emitted(scene, paths, hits))
+    acts = scene.program.leg(bounce)
+    leg = Leg(scene, sampler, bounce, L, mis, paths.exclude_prim, paths, intersect(scene, paths))
+    leg.paths, leg.hits = alpha_pass_through(scene, leg.paths, leg.hits, sampler, bounce, mis)
+    if leg.paths.glow is not None:
+        leg.paths = collect_glow(L, leg.paths)
+    for fly in acts.fly:
+        fly(leg)
+    leg.emission = emitted(scene, leg.paths, leg.hits)
+    leg.emission = without_caustics(scene, leg.paths, leg.left, leg.hits, leg.emission)
+    leg.lanes = keep(scene, leg.paths, leg.hits, leg.emission)
+    for meet in acts.meet:
+        meet(leg)
+    accumulate(L, leg.paths, mis_weighted(scene, leg.paths, leg.emission) if mis else leg.emission)
     if bounce == 0:
-        emission = show_background(scene, L, paths, hits, emission)
-    accumulate(L, paths, mis_weighted(scene, paths, emission) if mis else emission)
-    lanes = keep(scene, paths, hits, emission)
-    if bounce == 0:
-        lanes = off_catchers(scene, hits, lanes)
-    kept = compact(scene, paths, hits, lanes)
+        leg.lanes = off_catchers(scene, leg.hits, leg.lanes)
+    kept = compact(scene, leg.paths, leg.hits, leg.lanes)
     if paths.recorder is not None:
-        paths.recorder.record_hits(scene, MetSurfaces(bounce, paths, hits, lanes, *kept))
+        paths.recorder.record_hits(scene, MetSurfaces(bounce, leg.paths, leg.hits, leg.lanes, *kept))
     return kept
 
 

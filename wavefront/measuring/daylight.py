@@ -12,9 +12,10 @@ from numpy.typing import ArrayLike
 from ..accel import most_copies
 from ..arrays.vec import Doubles, Floats, f4, luminance
 from ..camera import Sensors
-from ..compile.scene import CompiledScene, compile_scene
+from ..compile.scene import CompiledScene
 from ..core.errors import SceneError, number
 from ..core.suggestions import suggests_keywords
+from ..features.compiling import compile_scene
 from ..io.to_scene import as_scene
 from ..lights import PatchedEnvironment, SkyPatches
 from ..sampling.sampler import Dimension

@@ -7,9 +7,9 @@ from dataclasses import replace
 from ..accel import Accelerator, Geometry, most_copies
 from ..aovs.geometric import ShapeTable
 from ..camera import Camera
-from ..compile.scene import compile_scene
 from ..core.errors import warn_caller
 from ..core.progress import phase
+from ..features.compiling import compile_scene
 from ..integrators import INTEGRATORS, WITH_MIS
 from ..lights import DirectionalLight, Environment
 from ..media import Medium
@@ -81,12 +81,11 @@ class PreparedScene:
                 most_copies(settings.values["accel"]),
                 mis=INTEGRATORS.find(settings.values["integrator"]) in WITH_MIS,
                 caustics=settings.values["caustics"],
+                asked={"background": settings.background_color},
             )
         media = compiled.media
         check_combinations({**values, MEDIA: media is not None and not media.only_absorbs})
-        self.compiled = replace(
-            compiled, background=settings.background_color, roulette_after=settings.roulette_after
-        )
+        self.compiled = replace(compiled, roulette_after=settings.roulette_after)
         self.shapes = ShapeTable(self.lighted.shapes)
 
     def fingerprint(self) -> str:

@@ -32,7 +32,8 @@ def scene_fingerprint(compiled: CompiledScene, geometries: Sequence[Geometry]) -
         If a part of it, such as an attribute of a user's BSDF, cannot be compared.
     """
     parts = {each.name: getattr(compiled, each.name) for each in fields(compiled)}
-    accelerator = parts.pop("accelerator")
+    accelerator, program = parts.pop("accelerator"), parts.pop("program")
+    parts["features"] = [each for each in program.features if each.compared]
     del parts["specular_surfaces"]  # they follow from the rest, and the setting is compared by itself
     if compiled.media is not None:
         parts["media"] = replace(compiled.media, touching=None)  # likewise

@@ -12,7 +12,8 @@ from numpy.typing import ArrayLike
 from ..accel import make_accelerator
 from ..arrays.state import Rays
 from ..arrays.vec import Floats, f4
-from ..compile.scene import CompiledScene, compile_scene
+from ..compile.scene import CompiledScene
+from ..features.compiling import compile_scene
 from ..lights.base import LightRecord, LightSample, emitters_of
 from ..scene import Scene
 from ..stages.interaction import interaction

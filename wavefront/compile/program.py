@@ -1,0 +1,143 @@
+"""The program of a compiled scene: its features, each bound to the points between stages where it acts.
+
+A feature is what few scenes have, such as a background or absorption. It is one file in features/: a class
+that says when a scene has it, and overrides the points where it acts. Each kind of feature is asked once,
+when a scene is compiled. Stages then go through tuples that hold what acts at a point, and nothing else: a
+scene without features pays for none, and no stage asks for what is absent.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import field
+from typing import TYPE_CHECKING, Any, ClassVar, Self, TypeVar
+
+from ..arrays.soa import soa
+from ..arrays.state import Contribution, Hits, Paths
+from ..arrays.vec import Bools, Floats, Ints
+from ..materials import Material
+from ..scene import Scene
+
+if TYPE_CHECKING:
+    from ..sampling.sampler import Sampler
+    from .scene import CompiledScene
+
+
+@soa
+class Facts:
+    """What features decide by whether a scene has them."""
+
+    scene: Scene
+    compiled: CompiledScene  # its arrays; its program is empty so far
+    materials: Sequence[Material]  # all of the scene, by their numbers
+    has_alpha: Bools  # (m + k + 1,) primitives whose opacity is below 1
+    asked: Mapping[str, Any]  # settings, by their names
+    found: list[Feature]  # those that the scene has, of those before in the order
+
+
+@soa
+class Leg:
+    """Paths on their way from one surface, or the camera, to the next. Features may replace its arrays."""
+
+    scene: CompiledScene
+    sampler: Sampler
+    bounce: int
+    L: Floats  # (3, slots) where light is added
+    mis: bool  # light that paths meet is weighted against light samples
+    left: Ints  # (n,) primitives that the paths have left, -1 for none
+    paths: Paths
+    hits: Hits
+    emission: Contribution = field(init=False)  # what the paths meet
+    lanes: Ints = field(init=False)  # (k,) of the paths that go on
+
+
+class Feature:
+    """What few scenes have, and where it acts. A subclass overrides `of` and the points where it acts.
+
+    A feature is sent to workers with the scene, so its attributes are arrays and the like.
+
+    Attributes
+    ----------
+    camera_only
+        It acts on the first leg of paths from the camera alone, and not on those from sensors.
+    compared
+        Two renders must have it in common so that one can go on from the checkpoint of the other. False where
+        it follows from settings, which are compared by themselves.
+    """
+
+    __slots__ = ()
+    camera_only: ClassVar[bool] = False
+    compared: ClassVar[bool] = True
+
+    @classmethod
+    def of(cls, facts: Facts) -> Self | None:
+        """Return the feature of a scene; None if the scene does not have it."""
+        return None
+
+    def fly(self, leg: Leg) -> None:
+        """Change paths and their hits, before any light is added."""
+
+    def meet(self, leg: Leg) -> None:
+        """Change the light that paths meet, before it is added, and which paths go on."""
+
+
+LEG_POINTS = ("fly", "meet")
+AnyFeature = TypeVar("AnyFeature", bound=Feature)
+
+
+class LegProgram:
+    """What acts on a leg: for each point, a tuple of what features do there; empty for most scenes."""
+
+    __slots__ = LEG_POINTS
+
+    def __init__(self, features: Sequence[Feature]) -> None:
+        self.fly, self.meet = (_at(features, point) for point in LEG_POINTS)
+
+
+class Program:
+    """The features of a scene, by the points where they act.
+
+    Parameters
+    ----------
+    features
+        Those that the scene has, in the order in which they act.
+    """
+
+    def __init__(self, features: Sequence[Feature] = ()) -> None:
+        self.features = tuple(features)
+        everywhere = [each for each in features if not each.camera_only]
+        self._camera, self._later = LegProgram(self.features), LegProgram(everywhere)
+
+    @classmethod
+    def of(cls, facts: Facts, kinds: Sequence[type[Feature]]) -> Self:
+        """Return the program of a scene, which may have features of some kinds."""
+        for kind in kinds:
+            feature = kind.of(facts)
+            if feature is not None:
+                facts.found.append(feature)
+        return cls(facts.found)
+
+    def leg(self, bounce: int) -> LegProgram:
+        """Return what acts on the leg that ends at a bounce."""
+        return self._later if bounce else self._camera
+
+    def of_sensors(self) -> Program:
+        """Return the program of paths that start at sensors: these measure the light that is there."""
+        return Program([each for each in self.features if not each.camera_only])
+
+    def find(self, kind: type[AnyFeature]) -> AnyFeature | None:
+        """Return the feature of a kind; None if the scene does not have it."""
+        return next((each for each in self.features if isinstance(each, kind)), None)
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        """Send only the features to other processes."""
+        return type(self), (self.features,)
+
+
+def acts(feature: Feature, point: str) -> bool:
+    """Return whether a feature acts at a point."""
+    return getattr(type(feature), point) is not getattr(Feature, point)
+
+
+def _at(features: Sequence[Feature], point: str) -> tuple[Any, ...]:
+    return tuple(getattr(each, point) for each in features if acts(each, point))

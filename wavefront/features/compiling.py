@@ -1,0 +1,44 @@
+"""Scenes are compiled: flat arrays, and the program of features that the scene has."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import replace
+from typing import Any
+
+from ..accel import Accelerator, Geometry
+from ..compile.program import Feature, Program
+from ..compile.scene import CompiledScene, gather_scene
+from ..lights.choice import LightSamplerMaker
+from ..scene import Scene
+from .background import Backdrop, Background
+
+# In the order in which they act.
+FEATURES: tuple[type[Feature], ...] = (Backdrop, Background)
+
+
+def compile_scene(
+    scene: Scene,
+    make_accelerator: Callable[[Geometry], Accelerator],
+    light_sampler: str | LightSamplerMaker = "spatial",
+    most_copies: int = 0,
+    mis: bool = False,
+    caustics: bool = False,
+    asked: Mapping[str, Any] | None = None,
+) -> CompiledScene:
+    """Return a scene as flat arrays, with the program of the features that it has.
+
+    Parameters
+    ----------
+    scene, make_accelerator, light_sampler, most_copies, mis, caustics
+        As for `compile.scene.gather_scene`.
+    asked
+        Settings that features read, by their names; those that are missing are None.
+
+    Raises
+    ------
+    SceneError
+        As `gather_scene`.
+    """
+    facts = gather_scene(scene, make_accelerator, light_sampler, most_copies, mis, caustics, asked)
+    return replace(facts.compiled, program=Program.of(facts, FEATURES))
