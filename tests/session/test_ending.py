@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 import wavefront as wf
+from wavefront.cli import main
 from wavefront.scheduling.adaptive import QUICK_SPP
 from wavefront.settings.settings import DEFAULT_SPP, LITTLE_NOISE
 
@@ -65,13 +66,18 @@ def test_what_is_asked_for_is_done(scene, given) -> None:
 
 
 def test_denoising_can_be_refused_and_asked_for() -> None:
-    plain, wanted = render(BALL, denoise=False), render(LIT, denoise=True)
+    plain, wanted, same = render(BALL, denoise=False), render(LIT, denoise=True), render(BALL, denoise=True)
+    assert same.metadata["quick"]
     assert plain.noisy is None
     assert plain.spp >= 32
     assert wanted.metadata["denoiser"]
 
 
-def test_measurements_and_data_sets_are_as_before(tmp_path) -> None:
+def test_measurements_and_data_sets_are_not_denoised(tmp_path, monkeypatch) -> None:
+    def refuse(image: wf.Image) -> wf.Image:
+        raise AssertionError("it was denoised")
+
+    monkeypatch.setattr(wf.Image, "denoise", refuse)
     found = wf.measure(wf.Scene([BALL], wf.Environment(1)), [(0, 2, 0)], (0, 1, 0), progress=False)
     assert (found.image.counts == DEFAULT_SPP).all()
     wf.write_dataset(tmp_path / "set", BALL, wf.turntable(BALL, 1, size=(16, 16)), progress=False)
@@ -81,10 +87,72 @@ def test_measurements_and_data_sets_are_as_before(tmp_path) -> None:
     assert '"denoise": true' not in about.read_text()
 
 
-def test_what_was_done_is_said(capsys, monkeypatch) -> None:
+@pytest.mark.parametrize("scene", [BALL, LIT], ids=["chosen light", "own light"])
+def test_what_was_done_is_said(scene, capsys, monkeypatch) -> None:
+    """By the bar, by a line at the end, and in the metadata; and how to have it otherwise."""
     monkeypatch.setattr("wavefront.session.hints.NOTICED", 0.0)
-    render(BALL, progress=None)
-    assert 'quality="reference"' in capsys.readouterr().err
+    monkeypatch.setattr("wavefront.core.progress.DELAY", -1.0)
+    image = render(scene, progress=None)
+    bar, _, line = capsys.readouterr().err.rpartition("hint: ")
+    end = image.metadata["end"]
+    assert 'quality="reference"' in end
+    assert f"ends {end}" in bar
+    assert 'quality="reference"' in line
+    assert ("denoised" in end) == ("denoised" in line) == image.metadata["quick"]
+
+
+def test_nothing_is_said_of_what_was_asked_for(capsys, monkeypatch) -> None:
+    monkeypatch.setattr("wavefront.session.hints.NOTICED", 0.0)
+    assert render(BALL, 2, progress=None).metadata["end"] is None
+    assert "reference" not in capsys.readouterr().err
+
+
+def test_info_says_how_a_picture_will_end(tmp_path, capsys) -> None:
+    path = tmp_path / "triangle.obj"
+    path.write_text("v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n")
+    main(["info", str(path)])
+    assert "picture: ends once it is clean" in capsys.readouterr().out
+
+
+def test_a_black_picture_ends_at_once() -> None:
+    camera = wf.Camera.look_at((0, 0, 5), (0, 0, 10), size=(16, 12))
+    assert render(BALL, camera=camera, background=0, size=None).spp == QUICK_SPP
+
+
+def test_samples_before_denoising_say_so(tmp_path) -> None:
+    image = render(BALL, checkpoint=tmp_path / "ball.wfck")
+    kept = wf.Image.load(tmp_path / "ball.wfck")
+    np.testing.assert_array_equal(kept.rgb, image.noisy.rgb)
+    assert kept.metadata["before_denoising"]
+    assert image.noisy.metadata["before_denoising"]
+    assert image.mean().before_denoising
+    assert not image.noisy.mean().before_denoising
+    assert "before_denoising" not in image.noisy.denoise().metadata
+    assert "before denoising" in wf.compare(image, image.noisy).shared
+    with pytest.raises(AssertionError, match="samples of the pictures, before denoising, differ"):
+        wf.testing.assert_same_picture(image, 3 * image)
+
+
+def test_merged_pictures_are_of_samples_and_say_so() -> None:
+    parts = [render(BALL, samples=each, denoise=True) for each in (range(2), range(2, 4))]
+    plain = render(BALL, samples=range(2, 4), aovs=("denoising_albedo", "denoising_normal"))
+    whole = render(BALL, 4)
+    for other in (parts[1], plain):
+        merged = parts[0].merge(other)
+        np.testing.assert_array_equal(merged.rgb, whole.rgb)
+        assert merged.metadata["before_denoising"]
+    assert "before_denoising" not in plain.metadata
+    assert plain.merge(parts[0]).metadata["before_denoising"]
+
+
+def test_a_checkpoint_that_ended_by_itself_goes_on_by_the_same_call_only(tmp_path) -> None:
+    path = tmp_path / "ball.wfck"
+    image = render(BALL, checkpoint=path)
+    np.testing.assert_array_equal(render(BALL, checkpoint=path).rgb, image.rgb)
+    render(BALL, 2, checkpoint=tmp_path / "older.wfck")
+    with pytest.raises(wf.SceneError, match='quality="reference" goes on'):
+        render(BALL, checkpoint=tmp_path / "older.wfck")
+    assert render(BALL, checkpoint=tmp_path / "older.wfck", quality="reference").spp == 100
 
 
 def test_mistakes_are_named() -> None:

@@ -765,10 +765,11 @@ def slow_filter(monkeypatch: pytest.MonkeyPatch) -> Iterator[tuple[list[wf.Image
     go.release(1000)
 
 
-def test_denoising_is_never_in_the_way(sent: Any, slow_filter: Any) -> None:
+def test_denoising_is_never_in_the_way(sent: Any, slow_filter: Any, monkeypatch: pytest.MonkeyPatch) -> None:
     """Controls and pictures go on; of several pictures the newest is next."""
     (page, frames), (given, go) = sent, slow_filter
     images = [looks(seed) for seed in range(4)]
+    monkeypatch.setattr(page_module, "MOST_AT_ONCE", 0)
     page._show_as(choice="denoised")
     for image in images[:3]:
         page.show(ViewerFrame(image, CAMERA, final=False))
@@ -794,6 +795,22 @@ def test_few_samples_are_shown_denoised_where_that_is_quick(sent: Any, slow_filt
     for image, final in ((more, False), (few, True)):
         page.show(ViewerFrame(image, CAMERA, final))
         assert eventually(lambda image=image: (page._codes == image.to_uint8()).all())
+    assert given == [few]
+
+
+def test_a_small_first_picture_is_never_shown_with_its_noise(sent: Any, slow_filter: Any) -> None:
+    """Nor is a picture denoised that is so already."""
+    (page, frames), (given, go) = sent, slow_filter
+    few = looks()
+    page.show(ViewerFrame(few, CAMERA, final=False))
+    assert eventually(lambda: given == [few])
+    assert not frames
+    go.release(1000)
+    assert eventually(lambda: page._codes is not None and (page._codes == (2 * few).to_uint8()).all())
+    clean = wf.Image(few.rgb, 8, {"denoiser": "oidn"}, layers=few.layers)
+    page._show_as(choice="denoised")
+    page.show(ViewerFrame(clean, CAMERA, final=True))
+    assert eventually(lambda: (page._codes == clean.to_uint8()).all())
     assert given == [few]
 
 
@@ -925,14 +942,21 @@ def test_a_viewer_refuses_what_it_cannot_do() -> None:
     assert set(threading.enumerate()) <= before
 
 
-def test_a_viewer_takes_the_samples_that_render_takes(capsys: pytest.CaptureFixture[str]) -> None:
-    with wf.view(BALL, size=(16, 16), port=0, open_browser=False, block=False) as viewer:
-        spp = viewer.wait_for_picture(SOON).spp
-    assert spp == wf.render(BALL, size=(16, 16), progress=False, quality="reference").spp
-    with pytest.raises(SystemExit):
-        main(["view", "--help"])
-    said = " ".join(capsys.readouterr().out.split())
-    assert f"samples per pixel (default: as --quality says; {spp} in the viewer)" in said
+@pytest.mark.parametrize("scene", [BALL, BALL.shapes[0]], ids=["own light", "chosen light"])
+def test_a_view_ends_as_a_picture_of_render_does(scene: Any, monkeypatch: pytest.MonkeyPatch) -> None:
+    lines: list[str] = []
+    line = page_module._line
+    monkeypatch.setattr(page_module, "_line", lambda text: lines.append(text) or line(text))
+    with wf.view(scene, size=(16, 16), port=0, open_browser=False, block=False) as viewer:
+        client = Client(viewer)
+        client.look()
+        assert eventually(lambda: any('quality="reference"' in each for each in lines))
+        found, camera = viewer.wait_for_picture(SOON), viewer.camera
+        client.socket.close()
+    asked = wf.render(scene, camera=camera, progress=False)
+    assert (found.rgb == asked.rgb).all()
+    assert found.metadata.get("denoiser") == asked.metadata.get("denoiser")
+    assert any("denoised" in each for each in lines if "reference" in each) == asked.metadata["quick"]
 
 
 def test_a_viewer_that_is_closed_says_so() -> None:

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from ..arrays.vec import Doubles
+from ..camera import Sensors
 from ..codecs.luminaires import EXTENSIONS as LUMINAIRES
 from ..codecs.luminaires import luminaire_texts, parsed_luminaire
 from ..core.errors import collect_warnings
@@ -20,6 +21,7 @@ from ..lights.ies import Web
 from ..materials import Material
 from ..scene.lighting import DEFAULT
 from ..scene.scene import FRAMING_VIEW, Scene
+from ..settings import Settings
 from ..shapes import Instance, Mesh, Shape
 from ..textures.base import BaseTexture
 from ..textures.image import Texture
@@ -83,6 +85,8 @@ def _lines(path: str, scene: Scene) -> Iterator[str]:
         yield f"settings: {', '.join(told)}"
     if not lit:
         yield f"light: none; render adds lighting={DEFAULT!r}{'' if camera else ' and a ground'}"
+    if not isinstance(scene.camera, Sensors):
+        yield f"picture: ends {Settings(**scene.settings).ending(not lit).end or 'as the settings say'}"
     yield "shapes:"
     for shape in scene.shapes:
         glow = "" if shape.emission is None else ", emits"

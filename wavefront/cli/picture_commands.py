@@ -7,6 +7,7 @@ from typing import Any
 
 from ..codecs.images import check_writable
 from ..core.errors import SceneError
+from ..film.aov_names import BEFORE_DENOISING
 from ..image import Image
 from ..image.comparison import compare
 from .command import PICTURE_FILE, add_command
@@ -54,7 +55,9 @@ def _merge(options: argparse.Namespace) -> int:
             raise SceneError(f"{path}: {error}") from error
     assert merged is not None
     merged.save(options.output)
-    print_done(f"{options.output}: {merged.spp} spp, samples {_listed(merged.metadata['sample_ranges'])}")
+    before = ", before denoising" if merged.metadata.get(BEFORE_DENOISING) else ""
+    samples = _listed(merged.metadata["sample_ranges"])
+    print_done(f"{options.output}: {merged.spp} spp, samples {samples}{before}")
     return 0
 
 

@@ -26,12 +26,16 @@ class Bar:
         Number of samples at most.
     seconds
         Time limit; if given, progress counts seconds in place of samples.
+    end
+        How the render ends if the number of samples is not known before. A bar shows it in place of a total.
     """
 
-    def __init__(self, progress: Progress, samples: int, seconds: float | None) -> None:
+    def __init__(
+        self, progress: Progress, samples: int, seconds: float | None, end: str | None = None
+    ) -> None:
         self._callback = progress if callable(progress) else None
         self._wanted = progress is None or progress is True
-        self._timed = seconds is not None
+        self._timed, self._end = seconds is not None, end
         self._total = samples if seconds is None else seconds
         self._done: float = 0
         self._told: float = 0  # time of the last report, in seconds
@@ -74,6 +78,8 @@ class Bar:
         style: dict[str, Any] = {"unit_scale": True}
         if self._timed:
             style = {"bar_format": "{l_bar}{bar}| {n:.0f}/{total:.0f} s{postfix}"}
+        if self._end is not None:
+            style["bar_format"] = "{n_fmt} samples [{elapsed}, {rate_fmt}{postfix}] " + f"ends {self._end}"
         bar = tqdm(total=self._total, initial=self._done, unit="sample", file=_Screen(), **style)
         if not bar.disable:  # by the environment variable TQDM_DISABLE
             bar.start_t -= elapsed

@@ -126,6 +126,8 @@ def write_dataset(
     views = _checked_cameras(cameras, settings.pop("size", None), layouts)
     display = Display(gamma, exposure, tone, white_balance)
     settings["camera"] = views[0]
+    if settings.get("denoise") is None:  # what learns from pictures must not learn a denoiser's ways
+        settings["denoise"] = bool(subject.settings.get("denoise"))
     settings["aovs"] = (*chosen_aovs("aovs", settings.get("aovs", ())), *AOVS_NEEDED)
     about = {
         "format": sorted(chosen),
@@ -135,7 +137,7 @@ def write_dataset(
         "display": repr(display),
         "layers": sorted(set(settings["aovs"])),
         "spp": spp,
-        "denoise": bool(settings.get("denoise", False)),
+        "denoise": settings["denoise"],
         "seconds": settings.get("seconds"),
     }
     writer = _Writer(root, subject, annotated, layouts, display, about)

@@ -136,6 +136,7 @@ def chosen_aovs(name: str, value: Any) -> tuple[str, ...]:
 
 
 GUIDES = "denoising_albedo", "denoising_normal"  # the AOVs that guide denoisers
+BEFORE_DENOISING = "before_denoising"  # in the metadata of the samples of pictures that are denoised
 NOISY = "noisy"  # the AOV that holds `rgb` as it was before denoising
 # what the names of AOVs that hold radiance begin with
 RADIANCE = (NOISY, "direct", "indirect", "light_groups.", CLAMPED)

@@ -177,8 +177,19 @@ def _are_pixels(pixels: NDArray[Any], count: int) -> bool:
     return whole and bool(((pixels >= 0) & (pixels < count)).all())
 
 
-def check_identity(path: str | os.PathLike[str], before: Mapping[str, Any], now: Mapping[str, Any]) -> None:
+def check_identity(
+    path: str | os.PathLike[str], before: Mapping[str, Any], now: Mapping[str, Any], otherwise: str = ""
+) -> None:
     """Check that a render can go on from a checkpoint.
+
+    Parameters
+    ----------
+    path
+        Of the file.
+    before, now
+        What both must have in common.
+    otherwise
+        What the message says besides.
 
     Raises
     ------
@@ -189,7 +200,7 @@ def check_identity(path: str | os.PathLike[str], before: Mapping[str, Any], now:
     if found:
         raise SceneError(
             f"{os.fspath(path)}: is the checkpoint of another render: {', '.join(found)}; "
-            "render as before, or choose another file"
+            f"render as before, or choose another file{otherwise}"
         )
 
 

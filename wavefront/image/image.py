@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import sys
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
 from html import escape
 from typing import Any
 
@@ -25,6 +26,7 @@ from ..core.html import picture_html
 from ..core.suggestions import Answers, did_you_mean, suggests_keywords
 from ..film.aov_names import (
     AOVS,
+    BEFORE_DENOISING,
     BOXES,
     CLAMPED,
     GIVEN_AOVS,
@@ -77,7 +79,9 @@ class Image(Answers):
         samples, rays, bad_samples, interrupted, version (of this package), numpy, noise (estimated relative
         error of the picture before denoising), rare (the part of the squared error that comes from few
         samples, see docs/convergence.md; None below sixteen samples), clamp and clamped (the part of the
-        light that it removed), caustics, boxes if they were asked for, and of a denoised picture denoiser.
+        light that it removed), caustics, boxes if they were asked for, quality, quick (whether the picture
+        ended as soon as it was clean), end (how it ended by itself and how to have it otherwise, or None),
+        of a denoised picture denoiser, and of its samples before_denoising.
     counts
         (H, W) int64 samples of each pixel, without those that were not finite.
     variance
@@ -254,7 +258,8 @@ class Image(Answers):
         The error comes from the difference of two halves of the samples, summed over the pixels, and where
         they are few also from the scatter of batches of samples; what stratified samples gain beyond half of
         them is extrapolated. Pixels that share paths are correlated within tiles, so there the differences
-        of the sums over tiles count. Other pixels are independent. Of a denoised picture the samples count.
+        of the sums over tiles count. Other pixels are independent. Of a denoised picture it is the mean of
+        the samples, and says so: `before_denoising`.
 
         Parameters
         ----------
@@ -286,7 +291,7 @@ class Image(Answers):
         """
         noisy = self.noisy
         if noisy is not None:
-            return noisy.mean(region, kind)
+            return replace(noisy.mean(region, kind), before_denoising=True)
         errors = PixelErrors(self.standard_error, self.freedom(), self.scatter, self._alone(), self.halves)
         where = self._region(region, kind)
         return region_mean(self.rgb, where, errors, self._most(where), self._error_absent())
@@ -543,12 +548,13 @@ class Image(Answers):
         from ..denoising import denoise, noisy_picture
 
         source = self.noisy or self
+        metadata = {name: value for name, value in source.metadata.items() if name != BEFORE_DENOISING}
         picture = noisy_picture(source.rgb, source.standard_error, source.layers, source.errors, source.spp)
         rgb, used = denoise(picture, denoiser)
         error = {} if source.standard_error is None else {NOISY: source.standard_error}
         return source.with_parts(
             rgb=rgb,
-            metadata={**source.metadata, "denoiser": used},
+            metadata={**metadata, "denoiser": used},
             standard_error=None,
             layers={**source.layers, NOISY: source.rgb},
             errors={**source.errors, **error},
@@ -556,12 +562,16 @@ class Image(Answers):
 
     @property
     def noisy(self) -> Image | None:
-        """The picture before denoising; None if this one was not denoised."""
+        """The samples before denoising, with their error; None if this picture was not denoised.
+
+        The promise of equal bits is one for this picture, and p-values, means of regions, `merge` and
+        checkpoints are of it. Its metadata has "before_denoising".
+        """
         if NOISY not in self.layers:
             return None
         return self.with_parts(
             rgb=self.layers[NOISY],
-            metadata={name: value for name, value in self.metadata.items() if name != "denoiser"},
+            metadata=_of_samples(self.metadata),
             standard_error=self.errors.get(NOISY),
             layers={name: layer for name, layer in self.layers.items() if name != NOISY},
             errors={name: error for name, error in self.errors.items() if name != NOISY},
@@ -579,7 +589,7 @@ class Image(Answers):
         where the samples of a part do not fill whole batches (of `film.batch_size`), the error is estimated
         from batches of other lengths. AOVs that are not sampled are those of this picture. In the metadata,
         counts and seconds are added, and `sample_ranges` are joined; the rest is that of this picture. If a
-        picture was denoised, the noisy one is merged.
+        picture was denoised, its samples are merged, and the metadata has "before_denoising".
 
         Parameters
         ----------
@@ -596,7 +606,9 @@ class Image(Answers):
             raise SceneError(f"a picture is merged with another one, got {type(other).__name__}")
         source = self.noisy or self
         sums = merged_sums(self.sums, other.sums)
-        image = film_image(sums, merged_metadata(source.metadata, other.metadata), keep_sums=True)
+        metadata = merged_metadata(source.metadata, other.metadata)
+        metadata = metadata if other.noisy is None else _of_samples(metadata)
+        image = film_image(sums, metadata, keep_sums=True)
         image.layers = {**source.layers, **image.layers}
         image.names = self.names
         return image
@@ -968,6 +980,12 @@ def film_image(sums: PictureSums, metadata: Mapping[str, Any], keep_sums: bool) 
     image.sums = sums if keep_sums else None
     _add_aovs(image, sums)
     return image
+
+
+def _of_samples(metadata: Mapping[str, Any]) -> dict[str, Any]:
+    """Return the metadata of the samples of a picture that was denoised."""
+    kept = {name: value for name, value in metadata.items() if name != "denoiser"}
+    return {**kept, BEFORE_DENOISING: True}
 
 
 def _checked_pixels(rgb: Any) -> NDArray[Any]:

@@ -82,7 +82,8 @@ def passes(
         first = last
         error = film.relative_variance(0 if everywhere else OUTLIERS)
         if quick:
-            error = error.compress(error > error.max() * EXACT)
+            noisy = error > error.max() * EXACT
+            error = error[noisy] if noisy.any() else error
         # inf where noise**2 would be an error
         limit = noise * noise * _trust(film.rare_part(error))
         if (error.max() if everywhere else error.mean()) <= limit:

@@ -35,6 +35,8 @@ class RenderLoop:
         As for `render`; `spp` is the most samples that a pixel may get.
     quick
         Whether the error is looked at early, as the picture will be denoised.
+    end
+        How the picture ends by itself, for the bar; None where that was asked for.
     begun
         The pass under way, if the accumulator has samples of an earlier part of the render.
 
@@ -62,10 +64,12 @@ class RenderLoop:
         progress: Progress,
         begun: Pass | None = None,
         quick: bool = False,
+        end: str | None = None,
     ) -> None:
         self.view, self.accumulator, self.scheduler = view, accumulator, scheduler
         self.spp, self.step = spp, begun
         self._noise, self._seconds, self._progress, self._quick = noise, seconds, progress, quick
+        self._end = end
         self.stopped = self.interrupted = False
         self.failure: Exception | None = None
 
@@ -97,7 +101,7 @@ class RenderLoop:
             True at the end of a pass, or of a shorter one.
         """
         most = self.accumulator.film.count.size * self.spp
-        with Bar(self._progress, most, self._seconds) as bar:
+        with Bar(self._progress, most, self._seconds, self._end) as bar:
 
             def waiting() -> None:
                 end_with_parent()

@@ -18,7 +18,7 @@ from ..camera import Camera
 from ..colors import EFFICACY
 from ..compile.brightest import brightest_emitter
 from ..compile.scene import CompiledScene
-from ..film.aov_names import BOXES, BRIGHTEST, BRIGHTEST_LUX, NARROW, geometric_names
+from ..film.aov_names import BEFORE_DENOISING, BOXES, BRIGHTEST, BRIGHTEST_LUX, NARROW, geometric_names
 from ..film.checkpoint import Checkpoint
 from ..image import Image
 from ..scheduling.accumulator import Accumulator
@@ -96,6 +96,7 @@ class CameraRender:
             progress=settings.values["progress"],
             begun=begun,
             quick=settings.quick,
+            end=settings.end,
         )
 
     def sweeps(
@@ -185,6 +186,8 @@ class CameraRender:
             "first": 0 if step is None else step.first,
         }
         metadata = {**self.metadata(cut_short=True), **accumulator.counts()}
+        if self._plan.settings.values["denoise"]:
+            metadata[BEFORE_DENOISING] = True
         pixels = None if step is None else step.pixels
         return Checkpoint(accumulator.sums, metadata, state, pixels, command)
 
@@ -209,6 +212,7 @@ class CameraRender:
             "accelerator": plan.scene.compiled.accelerator.name,
             "quality": settings.values["quality"],
             "quick": settings.quick,
+            "end": settings.end,
             "workers": plan.budget.workers,
             "executor": EXECUTORS.label(plan.executor),
             "seconds": self.loop.scheduler.elapsed,

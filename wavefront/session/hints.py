@@ -15,7 +15,7 @@ from ..image import Image
 from ..lights import InfiniteLight
 from ..lights.table import IrradianceOf
 from ..scene import Scene
-from ..settings import AUTO, Settings
+from ..settings import AUTO, DEFAULT_SPP, Settings
 from ..shapes import Instance
 from .prepared_scene import PreparedScene
 
@@ -43,7 +43,10 @@ NO_EMBREE = (
     "Embree is not installed: with `pip install embreex` meshes of {:,} triangles render about {:.0f} times "
     "as fast"
 )
-ENDED = 'the picture is denoised, from {} samples per pixel; quality="reference" takes 100, and does not'
+CLEAN_NOW = 'the picture is denoised, from {} samples per pixel; quality="reference" takes 100, and does not'
+LITTLE_NOW = (
+    'the picture ended after {} samples per pixel, at an error of {:.1%}; quality="reference" takes 100'
+)
 NO_DENOISER = (
     "Open Image Denoise is not installed: with `pip install pyoidn` denoise=True is faster and removes more "
     "noise"
@@ -127,7 +130,9 @@ class Hints:
 
     def _ending(self, image: Image) -> Iterator[str]:
         if self._settings.quick:
-            yield ENDED.format(image.spp)
+            yield CLEAN_NOW.format(image.spp)
+        elif self._settings.by_itself and image.spp < DEFAULT_SPP:
+            yield LITTLE_NOW.format(image.spp, image.metadata["noise"])
 
     def _of(self, image: Image) -> Iterator[str]:
         if image.metadata["hint"] is not None:

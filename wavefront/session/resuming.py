@@ -20,6 +20,7 @@ from ..scheduling.accumulator import Accumulator
 from ..settings import SETTINGS, Settings
 from .choice import Choice
 
+OTHERWISE = '; quality="reference" goes on with one of 100 samples that was begun by an earlier version'
 WRITING_SHARE = 0.05  # of the time that writing may take, on a slow disk; the interval is then longer
 
 
@@ -109,7 +110,8 @@ class CheckpointFile:
             return None
 
         def sums(header: Any) -> PictureSums:
-            check_identity(self.path, header["identity"], accumulator.sums.identity)
+            otherwise = OTHERWISE if settings.by_itself else ""
+            check_identity(self.path, header["identity"], accumulator.sums.identity, otherwise)
             first = header["metadata"]["sample_ranges"][0][0]
             if first != settings.first_sample:
                 raise SceneError(

@@ -460,7 +460,7 @@ class RenderSettings(TypedDict, total=False):
             "A file that keeps the state of the render. It is written every `checkpoint_interval` "
             "seconds, at Ctrl-C and at the end. The same call goes on from it, with the same bits as "
             "without a break; with more `spp` it goes on further. The file of another scene or of other "
-            "settings is refused.",
+            "settings is refused. It holds samples: the picture before denoising.",
             option="file that keeps the state of the render, from which the same command goes on",
             check=check_checkpoint,
         ),
@@ -540,8 +540,8 @@ class AllSettings(RenderSettings, total=False):
             "Samples per pixel, at least 1; by default as many as `quality` says. With `noise` or `seconds` "
             "the most that a pixel gets; by default then 65536, and with `seconds` as many as there is time "
             "for.",
-            option="samples per pixel (default: as --quality says; 100 in the viewer); the most there may be "
-            "with --noise or --seconds",
+            option="samples per pixel (default: as --quality says); the most there may be with --noise or "
+            "--seconds",
         ),
     ]
 

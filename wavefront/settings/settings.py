@@ -26,6 +26,15 @@ LITTLE_NOISE = 0.02  # at which a picture ends by itself
 CLEAN = 0.055  # likewise, where it is denoised then
 MAX_BRANCH_SAMPLES = 2**32  # a sample's index is 32 bits of its address, and each branch has one
 TRAINING = 0x5EED_0F_9417D  # the seed of a training pass is that of the picture XOR this
+# What happens where nothing says when a picture ends: in metadata, by the bar and by `wavefront info`
+CLEAN_END = (
+    f"once it is clean, at an error of {CLEAN:.1%} of lit pixels or {DEFAULT_SPP} samples per pixel, "
+    f'and denoised; quality="reference" takes {DEFAULT_SPP} and does not denoise'
+)
+NOISE_END = (
+    f"at an error of {LITTLE_NOISE:.0%} or {DEFAULT_SPP} samples per pixel; "
+    f'quality="reference" takes {DEFAULT_SPP}'
+)
 MAX_SPP_FOR_NOISE = 2**16  # where only `noise` was given
 
 
@@ -102,11 +111,16 @@ class Settings:
         given = (self.values[name] for name in ("spp", "noise", "seconds", "samples"))
         if self.values["quality"] != AUTO or any(each is not None for each in given):
             return self
-        quick = chosen_light and self.values["denoise"] is None
+        quick = chosen_light and self.values["denoise"] is not False
         end: AllSettings = {"denoise": True, "noise": CLEAN} if quick else {"noise": LITTLE_NOISE}
         ended = Settings(**{**self._given, **end, "spp": DEFAULT_SPP})
         ended.quick, ended.by_itself = quick, True
         return ended
+
+    @property
+    def end(self) -> str | None:
+        """How the picture ends by itself, and how to have it otherwise; None where that was asked for."""
+        return (CLEAN_END if self.quick else NOISE_END) if self.by_itself else None
 
     def labels(self) -> dict[str, Any]:
         """Return the settings that renders of the same samples have in common; functions by their names."""

@@ -40,6 +40,7 @@ class RegionMean:
     freedom: Doubles | None  # (3,) degrees of freedom with which `standard_error` is known
     pixels: int  # in the region
     error_absent: str = ""  # the reason why there is no standard error
+    before_denoising: bool = False  # whether the picture was denoised, and this is of its samples
 
     @suggests_keywords
     def interval(self, confidence: float = 0.95) -> tuple[Doubles, Doubles]:

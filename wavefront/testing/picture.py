@@ -9,6 +9,7 @@ import numpy as np
 
 from ..core.errors import SceneError, number
 from ..core.suggestions import suggests_keywords
+from ..film.aov_names import BEFORE_DENOISING
 from ..image import Image
 from ..image.comparison import Comparison, compare
 
@@ -53,11 +54,14 @@ def assert_same_picture(
     1.0
     """
     limit = number("p", p, lambda x: 0 < x < 1, "above 0 and below 1")
-    found = compare(_samples(a), _samples(b))
+    samples = _samples(a), _samples(b)
+    found = compare(*samples)
     if found.p_value is None:
         raise SceneError(f"the pictures cannot be compared by their samples: {found.p_absent}")
     if found.p_value < limit:
-        raise AssertionError(f"the pictures differ by more than noise, most at {_most(found)}:\n{found}")
+        denoised = any(each.metadata.get(BEFORE_DENOISING) for each in samples if isinstance(each, Image))
+        what = "samples of the pictures, before denoising," if denoised else "pictures"
+        raise AssertionError(f"the {what} differ by more than noise, most at {_most(found)}:\n{found}")
     return found
 
 

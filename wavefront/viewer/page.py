@@ -16,10 +16,11 @@ from numpy.typing import NDArray
 
 from ..codecs import png_jpeg
 from ..codecs.tone import TONES
-from ..core.errors import SceneError, one_of
+from ..core.errors import RenderError, SceneError, one_of
 from ..denoising import FEW, is_quick
 from ..image import Image
 from ..scheduling.heap import trim_heap
+from ..settings import DEFAULT_SPP
 from .background_denoiser import BackgroundDenoiser
 from .first_paint import FirstPaint, asked_first
 from .guard import Guard, take_values
@@ -29,6 +30,8 @@ from .viewpoint import FOV, Viewpoint, within
 
 QUALITY = 85  # of pictures while they refine, sent as jpg; the last one is a png
 ARRIVAL = 3.0  # seconds in which a page that connects takes the view; before, it has views of its own
+MOST_AT_ONCE = 1 << 15  # pixels of pictures that are shown denoised only: Open Image Denoise takes 0.06 s
+DENOISER = "denoiser"  # in the metadata of pictures that were denoised
 PAUSE = 0.1  # seconds between pictures that refine, so that the browser has time for movements
 EVERYWHERE = "0.0.0.0", "::", ""  # hosts that are reached from other machines, too
 STOPS = 6.0  # exposure, up and down
@@ -284,12 +287,7 @@ class Page:
                 exposure, tone = self._exposure, self._tone
             if frame is None:
                 continue
-            wants = choice == "denoised" or (
-                choice == "rgb" and is_quick() and frame.image.spp < FEW and not frame.final
-            )
-            self._denoiser.want(frame if wants else None)
-            of_view = wants and denoised is not None and denoised[0].camera is frame.camera
-            image = denoised[1] if of_view and denoised is not None else frame.image
+            image = self._shown(frame, choice, denoised)
             try:
                 codes = shown_codes(image, choice, exposure, tone)
             except SceneError as error:
@@ -300,6 +298,19 @@ class Page:
                 self._sent = frame, time.monotonic()
             self._send(codes, frame, image)
 
+    def _shown(self, frame: ViewerFrame, choice: str, denoised: tuple[ViewerFrame, Image] | None) -> Image:
+        """Return a picture as it is shown: denoised, if that is wanted and done; begin it otherwise."""
+        image = frame.image
+        few = choice == "rgb" and is_quick() and image.spp < FEW and not frame.final
+        wants = (choice == "denoised" or few) and DENOISER not in image.metadata
+        at_once = wants and is_quick() and image.rgb.size <= 3 * MOST_AT_ONCE
+        self._denoiser.want(frame if wants and not at_once else None)
+        if at_once:
+            with suppress(RenderError):  # of the library: it is shown as it is
+                return image.denoise()
+        of_view = wants and denoised is not None and denoised[0].camera is frame.camera
+        return denoised[1] if of_view and denoised is not None else image
+
     def _take_denoised(self, frame: ViewerFrame, image: Image) -> None:
         """Show a picture that was denoised, if it is still wanted."""
         with self._lock:
@@ -308,7 +319,7 @@ class Page:
 
     def _about(self, frame: ViewerFrame, image: Image) -> str:
         """Return what the line says of denoising."""
-        if image is not frame.image:
+        if DENOISER in image.metadata:
             return f" · denoised at {image.spp} spp" if image.spp < frame.image.spp else " · denoised"
         if self._choice != "denoised":
             return ""
@@ -334,7 +345,7 @@ class Page:
         noise = frame.image.metadata["noise"]
         error = f" · error {noise:.2%}" if np.isfinite(noise) else ""
         self._state.content = _line(
-            f"{width} × {height} · {frame.image.spp}{of} spp{error}{self._about(frame, image)}"
+            f"{width} × {height} · {frame.image.spp}{of} spp{error}{self._about(frame, image)}{_ended(frame)}"
         )
         # not with the first picture of a view, which is in a hurry
         if (width, height) == frame.camera.resolution:
@@ -352,6 +363,12 @@ def _is_at(camera: Any, view: Viewpoint) -> bool:
     around = view.surroundings
     pairs = (camera.position, around.to_page(view.origin)), (camera.look_at, around.to_page(view.target))
     return all(np.allclose(of_page, of_view, rtol=1e-3, atol=1e-3) for of_page, of_view in pairs)
+
+
+def _ended(frame: ViewerFrame) -> str:
+    """Return what the line says of a last picture that has ended by itself."""
+    by_itself = frame.final and frame.image.metadata.get("end") is not None
+    return f' · quality="reference" takes {DEFAULT_SPP}' if by_itself else ""
 
 
 def _line(text: str) -> str:

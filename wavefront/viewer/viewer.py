@@ -274,7 +274,7 @@ def view(
     scene
         As for `render`.
     spp
-        Samples per pixel of the last picture of a view; by default as for `render`.
+        Samples per pixel of the last picture of a view; by default it ends by itself, as for `render`.
     host
         The address to listen at. By default only this machine can connect; "0.0.0.0" lets all machines of
         the network in that know the token.
@@ -315,8 +315,6 @@ def view(
     refuse(settings, REFUSED)
     if not isinstance(port, int) or not 0 <= port < 2**16:
         raise SceneError(f"port is {port!r}; it must be a whole number from 0 to 65535")
-    if spp is None and settings.get("noise") is None and settings.get("seconds") is None:
-        spp = DEFAULT_SPP
     token = token_of(token)
     one_of("tone", tone, TONES)
     coloring = coloring_of(settings)
