@@ -47,6 +47,14 @@ def test_unknown_keywords(call, function: str, name: str, known: str | None) -> 
     assert str(caught.value) == f"{function}() got an unexpected keyword argument {name!r}{hint}"
 
 
+def test_other_errors_of_types_are_left_as_they_are() -> None:
+    with pytest.raises(TypeError, match="missing 1 required positional argument: 'radius'"):
+        wf.Sphere((0, 0, 0))
+    with pytest.raises(TypeError) as caught:
+        wf.Sphere(centre=(0, 0, 0), radius=1)
+    assert caught.value.__context__ is None
+
+
 @pytest.mark.parametrize(
     ("call", "hint"),
     [

@@ -16,8 +16,10 @@ import scenes
 from scripts import children, end_of, eventually, runs, script, wait_for
 
 import wavefront as wf
+from wavefront.core.errors import warn_caller
 from wavefront.core.shared import SharedInt
-from wavefront.scheduling import pool
+from wavefront.scheduling import inline, pool
+from wavefront.session import plan
 from wavefront.session import session as module
 
 LINUX = sys.platform.startswith("linux")
@@ -370,3 +372,66 @@ def test_a_function_of_progress_cannot_use_its_session() -> None:
     session = wf.Session(scenes.everything(), 4, progress=lambda done, total: session.run())
     with session, pytest.raises(wf.RenderError, match="in use by the caller of this function"):
         session.run()
+
+
+# --- A picture of one wave ------------------------------------------------------------------------
+
+
+class Noting(wf.Diffuse):
+    """Counts the threads while it is shaded, and warns as a part of this package does."""
+
+    def __init__(self) -> None:
+        super().__init__(0.5)
+        self.threads: list[tuple[set[threading.Thread], str]] = []
+
+    def sample_f(self, *given: Any) -> Any:
+        warn_caller("shaded")
+        self.threads.append((set(threading.enumerate()), np.geterr()["under"]))
+        return super().sample_f(*given)
+
+
+def noted(**settings: Any) -> tuple[wf.Image, list[tuple[set[threading.Thread], str]]]:
+    """Return a small picture of a ball that notes, and what it noted."""
+    ball = wf.Sphere((0, 0, 0), 1, material=Noting())
+    with pytest.warns(UserWarning, match="^shaded$") as caught, np.errstate(under="raise"):
+        image = wf.render([ball, wf.Environment(1)], 4, size=(16, 12), **settings)
+    assert len(caught) == 1
+    return image, ball.material.bsdf.threads  # type: ignore[attr-defined]
+
+
+def test_the_caller_traces_a_picture_of_one_wave() -> None:
+    before = set(threading.enumerate())
+    image, found = noted(progress=False)
+    assert found
+    assert all(threads == before and error == "ignore" for threads, error in found)
+    by_threads, found = noted(progress=False, executor="threads")
+    assert all(threads > before for threads, _ in found)
+    assert same(image, by_threads)
+
+
+def test_larger_pictures_have_workers(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(plan, "SMALL_WAVE", 16 * 12 * 4 * 4 - 1)
+    before = set(threading.enumerate())
+    _, found = noted(progress=False, workers=1)
+    assert all(threads > before for threads, _ in found)
+    _, found = noted(progress=False, workers=1, branches=1)
+    assert all(threads == before for threads, _ in found)
+
+
+def test_the_caller_shows_progress_and_can_stop_within_a_wave(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(inline, "POLL_INTERVAL", 0.0)
+    monkeypatch.setattr("wavefront.core.progress.TICK", 0.0)
+    told: list[float] = []
+
+    def progress(done: float, most: float) -> None:
+        told.append(done)
+        if len(told) == 3:
+            session.stop()
+
+    with wf.Session(everything(), 4, progress=progress, aovs="depth") as session:
+        with pytest.raises(wf.RenderError, match="stopped before there was a picture"):
+            session.run()
+        assert told == [0, 0, 0]
+        session.set_camera(None)
+        assert session.run().spp == 4
+    assert told[-1] == told[3 + told[3:].index(max(told))] == max(told) > 0

@@ -101,6 +101,15 @@ def test_settings_are_kept_as_they_are_checked() -> None:
     assert Settings(seconds=1).max_spp > 2**16
 
 
+def test_defaults_are_kept_without_a_check() -> None:
+    """Each is what its check would return, and the samplers are made of those that were given."""
+    for name, each in SETTINGS.items():
+        assert each.checked(name, each.default) == each.default
+    assert Settings().values == {name: each.default for name, each in SETTINGS.items()}
+    with pytest.raises(wf.SceneError, match="seed is -1"):
+        Settings(seed=-1)
+
+
 def test_layers_are_chosen_by_name() -> None:
     """One name or several, each once, in the order of the table; "all" is all without keys."""
     assert Settings().values["aovs"] == ()

@@ -16,8 +16,8 @@ COPIES = 1 << 18  # triangles of instances, in all, up to which Embree is faster
 
 
 def automatic(geometry: Geometry) -> Accelerator:
-    """Build an Embree accelerator where Embree is installed, else one in NumPy."""
-    return engine("auto")(geometry)
+    """Build an Embree accelerator where Embree is installed, else one in NumPy, and for no triangles too."""
+    return engine("auto")(geometry) if len(geometry.triangles) else NumpyAccelerator(geometry)
 
 
 ACCELERATORS: Registry[AcceleratorMaker] = Registry(
@@ -35,7 +35,7 @@ def make_accelerator(geometry: Geometry, accel: str | AcceleratorMaker) -> Accel
     SceneError
         If the name is unknown, or Embree is asked for and not installed.
     """
-    return engine(accel)(geometry)
+    return ACCELERATORS.find(accel)(geometry)
 
 
 def most_copies(accel: str | AcceleratorMaker) -> int:

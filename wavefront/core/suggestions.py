@@ -118,27 +118,30 @@ def suggests_keywords(function: Callable[P, R]) -> Callable[P, R]:
 
     @wraps(function)
     def checked(*args: P.args, **kwargs: P.kwargs) -> R:
-        check_keywords(function, known, args, kwargs)
-        return function(*args, **kwargs)
+        try:
+            return function(*args, **kwargs)
+        except TypeError:
+            unexpected = unknown_keyword(function, known, args, kwargs)
+            if unexpected is None:
+                raise
+        raise unexpected
 
     return checked
 
 
-def check_keywords(
+def unknown_keyword(
     function: Callable[..., object], known: Collection[str], args: Sequence[object], names: Iterable[str]
-) -> None:
-    """Check the names of keyword arguments, given those that are known and the positional arguments.
+) -> TypeError | None:
+    """Return the error of the first keyword argument that is not known, as in Python; None if all are.
 
-    Raises
-    ------
-    TypeError
-        If one is unknown, as in Python.
+    `args` are the positional arguments.
     """
     for name in names:
         if name not in known:
             title = type(args[0]).__name__ if function.__name__ == "__init__" else function.__qualname__
             hint = did_you_mean(name, known, _places(function, args))
-            raise TypeError(f"{title}() got an unexpected keyword argument {name!r}{hint}")
+            return TypeError(f"{title}() got an unexpected keyword argument {name!r}{hint}")
+    return None
 
 
 def _places(function: Callable[..., object], args: Sequence[object]) -> Iterator[str]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
+from functools import cache
 from typing import Any
 
 import numpy as np
@@ -36,9 +37,15 @@ def picture_memory(size: Sequence[int], layers: Sequence[str] = (), light_tracin
     light_tracing
         Whether there are paths from lights, too.
     """
-    sums = bytes_per_pixel(lambda pixels: empty_sums((pixels, 1), layers, light_tracing))
+    sums = _bytes_of_sums(tuple(layers), light_tracing)
     picture = PICTURE_BYTES + AOV_BYTES * sum(aov_of(name).channels for name in layers)
     return (sums + picture) * size[0] * size[1] + SPARE_BYTES
+
+
+@cache
+def _bytes_of_sums(layers: tuple[str, ...], light_tracing: bool) -> int:
+    """Return how many bytes each pixel takes of the sums."""
+    return bytes_per_pixel(lambda pixels: empty_sums((pixels, 1), layers, light_tracing))
 
 
 class Accumulator:

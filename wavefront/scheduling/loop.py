@@ -13,8 +13,8 @@ from ..core.progress import Bar, Progress
 from ..core.shared import SharedInt, Stopped
 from .accumulator import Accumulator
 from .adaptive import Pass, passes, unfinished
+from .inline import AnyPool
 from .jobs import CameraJob, Job, JobResult, split_jobs
-from .pool import WorkerPool
 from .scheduler import Scheduler
 
 PassSplitter: TypeAlias = Callable[[Pass], Iterable[Pass]]
@@ -75,7 +75,7 @@ class RenderLoop:
 
     def sweeps(
         self,
-        pool: WorkerPool[Job, JobResult],
+        pool: AnyPool,
         surfaces: SharedInt,
         wave_done: Callable[[], object],
         split: PassSplitter,
@@ -137,7 +137,10 @@ class RenderLoop:
                 self.failure = error
 
     def _results(
-        self, pool: WorkerPool[Job, JobResult], jobs: Iterator[Job], waiting: Callable[[], None]
+        self,
+        pool: AnyPool,
+        jobs: Iterator[Job],
+        waiting: Callable[[], None],
     ) -> Iterator[tuple[Job, JobResult]]:
         """Yield jobs with their results, in order; those for which there was no memory are halved.
 

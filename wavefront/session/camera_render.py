@@ -24,9 +24,9 @@ from ..image import Image
 from ..scheduling.accumulator import Accumulator
 from ..scheduling.adaptive import Pass
 from ..scheduling.executors import EXECUTORS, waves_per_job
-from ..scheduling.jobs import CameraJob, Job, JobResult
+from ..scheduling.inline import AnyPool
+from ..scheduling.jobs import CameraJob
 from ..scheduling.loop import PassSplitter, RenderLoop
-from ..scheduling.pool import WorkerPool
 from ..scheduling.scheduler import Scheduler
 from ..scheduling.tracing import MonitoredAccelerator, WaveMonitor
 from ..version import VERSION
@@ -101,7 +101,7 @@ class CameraRender:
 
     def sweeps(
         self,
-        pool: WorkerPool[Job, JobResult],
+        pool: AnyPool,
         monitor: WaveMonitor,
         wave_done: Callable[[], object],
         split: PassSplitter,

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from contextlib import nullcontext
 from dataclasses import replace
 
 from ..aovs.narrow_lobes import narrow_aovs
@@ -17,6 +18,7 @@ from ..scheduling.blas import single_threaded_blas
 from ..scheduling.budget import Budget
 from ..scheduling.executors import ExecutorLike, needs_pickling
 from ..scheduling.payload import can_be_sent
+from ..scheduling.scheduler import SMALL_WAVE
 from ..scheduling.tracing import Tracer
 from ..settings import Settings
 from .choice import Choice, choose, learn_guide
@@ -35,6 +37,7 @@ class Plan:
     tracer: Tracer
     executor: str | ExecutorLike
     budget: Budget
+    inline: bool = False  # the picture is one wave, which the caller traces
     choice: Choice = NO_CHOICE  # until there is one
 
 
@@ -49,8 +52,9 @@ def trained_guide(settings: Settings, scene: PreparedScene, camera: Camera) -> G
 def with_choice(plan: Plan, camera: Camera, run: JobsRunner) -> Plan:
     """Return a plan with a choice of how the paths that a camera sees go on; `run` does trials' jobs."""
     compiled, has_guide = plan.scene.compiled, plan.tracer.table is not None
-    with phase("trying what pays", plan.settings.values["progress"]), single_threaded_blas:
-        view, workers = compiled.view(camera), plan.budget.workers
+    view, workers = compiled.view(camera), plan.budget.workers
+    title = nullcontext() if plan.inline else phase("trying what pays", plan.settings.values["progress"])
+    with title, nullcontext() if plan.inline else single_threaded_blas:
         choice = choose(plan.settings, compiled, view, has_guide, run, workers)
     hint = caustics_hint(plan.settings, plan.scene) if camera.sensor is None else None
     hint = hint or choice.hint
@@ -74,7 +78,16 @@ def make_plan(settings: Settings, scene: PreparedScene, camera: Camera, table: G
     if settings.values["executor"] is None and needs_pickling(executor) and not can_be_sent(tracer):
         executor = "threads"
     budget = settings.budget(camera.size, executor, tracer.recorded_aovs)
-    return Plan(settings, scene, tracer, executor, budget)
+    return Plan(settings, scene, tracer, executor, budget, fits_a_wave(settings, camera.size, budget))
+
+
+def fits_a_wave(settings: Settings, size: tuple[int, int], budget: Budget) -> bool:
+    """Return whether a picture is one small wave, so that neither threads nor processes make it faster."""
+    values = settings.values
+    if values["executor"] is not None or values["seconds"] is not None or values["guide"]:
+        return False
+    paths = size[0] * size[1] * settings.max_spp * settings.most_branches
+    return paths <= min(SMALL_WAVE, budget.wave_size)
 
 
 def _aovs_of_sensors(scene: PreparedScene, camera: Camera) -> tuple[str, ...]:

@@ -83,8 +83,8 @@ class PreparedScene:
                 caustics=settings.values["caustics"],
                 asked={"background": settings.background_color},
             )
-        media = compiled.media
-        check_combinations({**values, MEDIA: media is not None and not media.only_absorbs})
+        if compiled.media is not None and not compiled.media.only_absorbs:
+            check_combinations({**values, MEDIA: True})
         self.compiled = replace(compiled, roulette_after=settings.roulette_after)
         self.shapes = ShapeTable(self.lighted.shapes)
 

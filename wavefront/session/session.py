@@ -25,6 +25,7 @@ from ..io.to_scene import as_scene, choose_camera, coloring_of
 from ..scheduling.accumulator import Accumulator
 from ..scheduling.blas import reserve_buffers
 from ..scheduling.executors import shares_scene
+from ..scheduling.inline import AnyPool, InlineWorker
 from ..scheduling.loop import PassSplitter, doubling, undivided
 from ..scheduling.pool import WorkerPool
 from ..scheduling.tracing import WaveMonitor, trace_any_job
@@ -39,7 +40,7 @@ from .final_checks import (
     warn_of_long_paths,
 )
 from .hints import Hints
-from .plan import make_plan, trained_guide, with_choice
+from .plan import fits_a_wave, make_plan, trained_guide, with_choice
 from .prepared_scene import PreparedScene
 from .sole_use import SoleUse
 
@@ -125,28 +126,40 @@ class Session:
         try:
             with self.interrupt_handler:
                 self._pool.start()  # before there are sums, of which forked processes would keep old copies
-                with ThreadPoolExecutor(1) as aside:
-                    sums = aside.submit(
-                        Accumulator, camera.size, self._plan.tracer.recorded_aovs, values["caustics"]
-                    )
-                    self._plan = with_choice(self._plan, camera, self._run_trial)
-                self._begin_picture(camera, sums.result(), begin)
+                self._begin_first_picture(camera, begin)
         except BaseException:
             with self.interrupt_handler:
                 self._pool.close()
             raise
 
+    def _begin_first_picture(self, camera: Camera, begin: float) -> None:
+        """Choose how paths go on; meanwhile a thread takes the memory of large pictures."""
+        of_sums = camera.size, self._plan.tracer.recorded_aovs, self._settings.values["caustics"]
+        if self._plan.inline:
+            self._plan = with_choice(self._plan, camera, self._run_trial)
+            self._begin_picture(camera, Accumulator(*of_sums), begin)
+            return
+        with ThreadPoolExecutor(1) as aside:
+            sums = aside.submit(Accumulator, *of_sums)
+            self._plan = with_choice(self._plan, camera, self._run_trial)
+        self._begin_picture(camera, sums.result(), begin)
+
     def _make_pool(self) -> None:
         """Make a pool of workers, which start with the first job if not before."""
         self._monitor = WaveMonitor()
         self.interrupt_handler.watch(self._monitor.stop)
-        self._pool = WorkerPool[Any, Any](  # of two kinds of jobs, each with its own kind of results
-            partial(trace_any_job, self._plan.tracer, self._monitor),
-            self._plan.budget.workers,
-            self._plan.executor,
-            self._monitor.stop,
-            self._settings.values["strict"],
-        )
+        work = partial(trace_any_job, self._plan.tracer)
+        self._pool: AnyPool  # of two kinds of jobs, each with its kind of results
+        if self._plan.inline:
+            self._pool = InlineWorker(work, self._monitor)
+        else:
+            self._pool = WorkerPool(
+                partial(work, self._monitor),
+                self._plan.budget.workers,
+                self._plan.executor,
+                self._monitor.stop,
+                self._settings.values["strict"],
+            )
         if self._in_block:
             self._pool.__enter__()
 
@@ -162,9 +175,8 @@ class Session:
             If Ctrl-C was pressed.
         """
         if shares_scene(self._plan.executor):
-            pool: WorkerPool[TrialJob, TrialPart] = self._pool
             try:
-                return [part for _, part in pool.run(jobs)]
+                return [part for _, part in self._pool.run(jobs)]
             except (Stopped, MemoryError):
                 if not self.interrupt_handler.pressed:
                     self._pool.discard()
@@ -311,6 +323,7 @@ class Session:
                 self._pool.cancel()
             other_workers = (executor, self._plan.executor) == ("processes", "threads")
             other_workers |= budget.workers != self._plan.budget.workers
+            other_workers |= fits_a_wave(settings, camera.size, budget) != self._plan.inline
             table = trained_guide(settings, self._scene, camera)
             other_workers |= table is not self._plan.tracer.table
             if self._monitor.stop.value or other_workers:

@@ -69,17 +69,20 @@ class Settings:
 
     def __init__(self, **given: Unpack[AllSettings]) -> None:
         self._given: dict[str, Any] = {**given}
-        found: Any = {
-            name: each.checked(name, given.get(name, each.default)) for name, each in SETTINGS.items()
-        }
+        found: Any = {name: each.default for name, each in SETTINGS.items()}
+        for name, each in SETTINGS.items():
+            if name in given and self._given[name] is not each.default:
+                found[name] = each.checked(name, self._given[name])
         self.values: AllSettings = found
         if self.values["denoise"]:
             self.values["aovs"] = chosen_aovs("aovs", (*self.values["aovs"], *GUIDES))
         check_combinations(self.values)
         self.max_spp = self._most_samples()
         self.worker_count = worker_count(self.values["workers"], self.values["executor"])
-        make_sampler(self.values["sampler"], self.values["seed"])
-        self.executor_for((0, 0))
+        if not given.keys().isdisjoint(("sampler", "seed")):
+            make_sampler(self.values["sampler"], self.values["seed"])
+        if self.values["executor"] is not None:
+            self.executor_for((0, 0))
 
     def after(self, first: Mapping[str, Any]) -> Settings:
         """Return these settings after those of a scene, which count where there are none.

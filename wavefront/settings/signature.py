@@ -7,7 +7,7 @@ from collections.abc import Callable
 from functools import wraps
 from typing import ParamSpec, TypeVar
 
-from ..core.suggestions import check_keywords
+from ..core.suggestions import unknown_keyword
 from .declaration import SETTINGS
 
 P = ParamSpec("P")
@@ -29,7 +29,9 @@ def takes_settings(function: Callable[P, R]) -> Callable[P, R]:
 
     @wraps(function)
     def checked(*args: P.args, **kwargs: P.kwargs) -> R:
-        check_keywords(function, known, args, kwargs)
+        unexpected = unknown_keyword(function, known, args, kwargs)
+        if unexpected is not None:
+            raise unexpected
         return function(*args, **kwargs)
 
     checked.__signature__ = signature  # type: ignore[attr-defined]
