@@ -151,7 +151,6 @@ def gather_scene(
         cannot emit light, a light is malformed, too far away or too strong for the scene's size, or the
         choice is unknown.
     """
-    scene.check()
     low, high = scene.bounds
     radius = float(np.linalg.norm(high - low)) / 2
     scale = length_factor(radius)
