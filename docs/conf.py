@@ -79,6 +79,12 @@ TOCTREE = "\n```{{toctree}}\n:hidden:\n:caption: {caption}\n\n{pages}\n```\n"
 def links_to_the_tutorial(app, docname, source):
     """Point links to the tutorial's scripts to the pages that sphinx-gallery makes of them."""
     source[0] = TUTORIAL.sub(r"](\1generated/tutorial/index.rst)", source[0])
+    if docname == "docs/generated/tutorial/index":
+        source[0] = (
+            re.sub(r"<(\d\w+)\.py>`_", r"<\1.html>`_", source[0])
+            .replace("<tracer.py>`_", "<09_the_library.html>`_")
+            .replace("<../algorithm.md>`_", "<../../algorithm.html>`_")
+        )
 
 
 def contents_from_lists(app, docname, source):

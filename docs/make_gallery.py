@@ -4,10 +4,12 @@ python docs/make_gallery.py [name ...]
 
 Each picture is what `python examples/NAME.py --size SIZE --spp SPP` renders, as a jpg, denoised where the
 table says so. A card is the middle of it, 480 by 320 pixels. It needs pyoidn, and minutes for each picture.
+The name `tutorial` stands for the pictures on the tutorial's start page.
 """
 
 from __future__ import annotations
 
+import contextlib
 import runpy
 import sys
 import tempfile
@@ -69,6 +71,19 @@ def make(name: str) -> None:
         picture.save(DOCS / "cards" / f"{name}.jpg", quality=QUALITY, optimize=True)
 
 
+def make_tutorial() -> None:
+    """Run the steps of the tutorial, and write the first two pictures of each beside each other."""
+    for script in sorted((DOCS / "tutorial").glob("[0-9]*.py")):
+        with tempfile.TemporaryDirectory() as folder, contextlib.chdir(folder):
+            runpy.run_path(str(script), run_name="__main__")
+            first = [Pillow.open(path).convert("RGB") for path in sorted(Path().glob("*.png"))[:2]]
+        scaled = [each.resize((180 * each.width // each.height, 180)) for each in first]
+        pair = Pillow.new("RGB", (sum(each.width for each in scaled), 180))
+        for k, each in enumerate(scaled):
+            pair.paste(each, (sum(other.width for other in scaled[:k]), 0))
+        pair.save(DOCS / "tutorial" / "pictures" / f"{script.stem}.jpg", quality=QUALITY, optimize=True)
+
+
 def middle(picture: Pillow.Image) -> Pillow.Image:
     """Return the largest part in the middle of a picture that has the shape of a card."""
     width, height = picture.size
@@ -78,7 +93,7 @@ def middle(picture: Pillow.Image) -> Pillow.Image:
 
 
 if __name__ == "__main__":
-    sys.path.insert(0, str(ROOT / "examples"))  # some examples use parts of others
+    sys.path[:0] = [str(ROOT / "examples"), str(DOCS / "tutorial")]  # some use parts of others
     (DOCS / "cards").mkdir(exist_ok=True)
-    for name in sys.argv[1:] or list(PICTURES):
-        make(name)
+    for name in sys.argv[1:] or [*PICTURES, "tutorial"]:
+        make_tutorial() if name == "tutorial" else make(name)

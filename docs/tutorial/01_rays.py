@@ -111,7 +111,9 @@ iio.imwrite("2_normal.png", (127.5 + 127.5 * normal).astype(np.uint8).repeat(2, 
 # ---------
 #
 # 1. Set ``FIELD`` to 30 degrees. *Expect* the spheres at more than twice the size.
-# 2. Replace 1e-4 by 0 and render step 2. *Expect* black dots on lit surfaces: half of the shadow rays meet
-#    the surface from which they start.
+# 2. In ``tracer.py``, whose ``intersect`` the next steps use, replace ``> 1e-4`` by ``> 0`` and ``< 1e-4`` by
+#    ``<= 0``, and render step 2. *Expect* black dots on half of the lit points of the small spheres: their
+#    shadow rays meet the sphere from which they start. (With ``< 0`` the walls turn black too: a hit at the
+#    distance 0 counts.)
 # 3. How many additions and multiplications does a picture of a million pixels take here? *Expect* about 3·10⁸
 #    for ten spheres, and 10⁴ times as many for a mesh of 100 000 triangles: the reason for trees.

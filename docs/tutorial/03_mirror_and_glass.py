@@ -9,9 +9,21 @@ scatters of the light that arrives from all directions :math:`\omega_i` (Kajiya 
    + \int f(\omega_o,\omega_i)\,L_i(x,\omega_i)\,\lvert\cos\theta_i\rvert\,\mathrm d\omega_i .
 
 :math:`f` is the *bidirectional scattering distribution function*, BSDF for short. It describes the
-material: which part of the light from :math:`\omega_i` goes on to :math:`\omega_o`, per steradian. It has
-to be symmetric for reflection, :math:`f(\omega_o,\omega_i)=f(\omega_i,\omega_o)`, and may not create light,
-:math:`\int f\cos\theta_i\,\mathrm d\omega_i\le 1`.
+material: which part of the light from :math:`\omega_i` goes on to :math:`\omega_o`, per steradian.
+
+**What the integral runs over.** Directions are points on the unit sphere, and :math:`\mathrm d\omega` is a
+small area on it, a *solid angle*, measured in steradian. With the angle :math:`\theta` to the normal and the
+azimuth :math:`\varphi` around it,
+
+.. math:: \mathrm d\omega = \sin\theta\,\mathrm d\theta\,\mathrm d\varphi :
+
+the circle of directions at :math:`\theta` is :math:`2\pi\sin\theta` long. A hemisphere has
+:math:`2\pi`, the sphere :math:`4\pi`. For matte surfaces and mirrors the domain is the hemisphere around the
+normal. For glass it is the whole sphere, since light arrives through it from the other side; this is why
+the cosine has the bars of an absolute value.
+
+A BSDF has to be symmetric for reflection, :math:`f(\omega_o,\omega_i)=f(\omega_i,\omega_o)`, and may not
+create light, :math:`\int f\cos\theta_i\,\mathrm d\omega_i\le 1`.
 
 **Matte.** :math:`f=\rho/\pi` for all directions. The integral of :math:`\cos\theta` over the hemisphere is
 :math:`\pi`, so a part :math:`\rho` of the light is scattered.
@@ -105,7 +117,9 @@ for number, bounces in ((1, 1), (2, 6)):
 # ---------
 #
 # 1. Leave out the division by :math:`\cos\theta_i` in the formula of the mirror, that is, multiply its color
-#    by the cosine. *Expect* a mirror sphere that gets black towards its rim.
+#    by the cosine, and divide the new picture by the old one. *Expect* a quotient that falls from 1 in the
+#    middle of the mirror sphere to a half at 87 % of its radius, and to 0 at its rim. In the picture itself
+#    it is hardly seen.
 # 2. Set the index of the glass to 1. *Expect* the sphere to vanish, except for its shadow.
 # 3. Why is the shadow of the glass sphere as black as that of the matte sphere? *Expect* a flaw of the
 #    method: a shadow ray goes straight and stops at the glass. Light that the glass refracts is a caustic,

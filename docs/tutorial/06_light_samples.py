@@ -93,6 +93,7 @@ iio.imwrite("1_direct.png", np.concatenate(pictures, 1).repeat(4, 0).repeat(4, 1
 # ---------
 #
 # 1. Choose points evenly on the whole surface of the lamp, with the density :math:`d^2/(4\pi
-#    r^2\cos\theta_L)` per solid angle. *Expect* half of the samples to be lost, since half of the lamp faces
-#    away.
-# 2. Give the lamp a radius of 20. *Expect* wide soft shadows, and more noise in them.
+#    r^2\cos\theta_L)` per solid angle. *Expect* more than half of the samples to be lost: less than half of a
+#    sphere faces any point.
+# 2. Give the lamp a radius of 12 in ``tracer.py``. *Expect* wide soft shadows: in one picture of one path,
+#    more than twice as many points of the floor see a part of the lamp.

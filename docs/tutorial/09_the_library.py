@@ -6,6 +6,7 @@ The library computes the same integrals. Here it renders the same scene, built f
 agree. The end of this page has all steps in one file.
 """
 
+import numpy as np
 import tracer
 
 import wavefront as wf
@@ -18,9 +19,12 @@ for k, (center, radius) in enumerate(zip(tracer.CENTER, tracer.RADIUS, strict=Tr
     spheres.append(wf.Sphere(center, radius, material=material, emission=emission))
 scene = wf.Scene(spheres, camera=wf.Camera.look_at(tracer.EYE, tracer.TARGET, fov=60, size=(64, 48)))
 
+library = [wf.render(scene, 8, seed=seed, max_bounces=5).rgb.mean() for seed in range(8)]
+tutorial = [tracer.render(tracer.full, 64, 48, 8, seed).mean() for seed in range(8)]
+for name, means in (("library", library), ("tutorial", tutorial)):
+    print(f"{name:<8} {np.mean(means):.3f} ± {np.std(means, ddof=1) / 8**0.5:.3f}")
+
 image = wf.render(scene, 64, max_bounces=5)
-ours = tracer.render(tracer.full, 64, 48, 64)
-print(f"library {image.rgb.mean():.3f}, tutorial {ours.mean():.3f}")
 image.save("1_library.png")
 
 # %%
@@ -92,10 +96,12 @@ better.save("2_caustics_and_denoised.png")
 # Exercises
 # ---------
 #
-# 1. Render with ``noise=0.05`` in place of a number of samples. *Expect* far more than 64 samples, most of
-#    them where the glass sphere focuses light: ``image.counts`` shows where.
-# 2. Add a mesh: ``wf.load_mesh("part.stl")`` placed by ``wf.Instance``. *Expect* the time to grow much more
-#    slowly than the number of triangles.
+# 1. Render with ``noise=0.15`` in place of a number of samples. *Expect* 32 samples on the floor in front,
+#    where the light is even, and half as many again in most other places: ``image.counts`` shows them, for
+#    tiles of 8 by 8 pixels.
+# 2. Add a mesh. ``ball = trimesh.creation.icosphere(subdivisions=4)`` has 5 120 triangles, and
+#    ``wf.Mesh(8 * ball.vertices + (-2, -2, 14), ball.faces)`` stands in front. *Expect* the time to grow much
+#    more slowly than the number of triangles: four times as many with each subdivision.
 # 3. Write a BSDF of your own, and test it by ``wf.testing.check_bsdf``: see the page on materials.
 #
 # The whole tracer
