@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from contextlib import nullcontext
 from dataclasses import replace
 
@@ -15,7 +16,7 @@ from ..integrators import INTEGRATORS
 from ..integrators.tuning import JobsRunner
 from ..sampling.filters import FILTERS
 from ..scheduling.blas import single_threaded_blas
-from ..scheduling.budget import Budget
+from ..scheduling.budget import Budget, make_budget
 from ..scheduling.executors import ExecutorLike, needs_pickling
 from ..scheduling.payload import can_be_sent
 from ..scheduling.scheduler import SMALL_WAVE
@@ -77,8 +78,24 @@ def make_plan(settings: Settings, scene: PreparedScene, camera: Camera, table: G
     executor = settings.executor_for(camera.size)
     if settings.values["executor"] is None and needs_pickling(executor) and not can_be_sent(tracer):
         executor = "threads"
-    budget = settings.budget(camera.size, executor, tracer.recorded_aovs)
+    budget = budget_of(settings, camera.size, executor, tracer.recorded_aovs)
     return Plan(settings, scene, tracer, executor, budget, fits_a_wave(settings, camera.size, budget))
+
+
+def budget_of(
+    settings: Settings, size: tuple[int, int], executor: str | ExecutorLike, layers: Sequence[str] = ()
+) -> Budget:
+    """Return the workers, and the largest wave, for a picture of a size (width, height) with layers."""
+    values, most = settings.values, settings.values["max_memory"]
+    return make_budget(
+        None if most is None else int(most),
+        size,
+        settings.worker_count,
+        values["wave_size"],
+        executor != "threads",
+        layers,
+        values["caustics"],
+    )
 
 
 def fits_a_wave(settings: Settings, size: tuple[int, int], budget: Budget) -> bool:

@@ -40,7 +40,7 @@ from .final_checks import (
     warn_of_long_paths,
 )
 from .hints import Hints
-from .plan import fits_a_wave, make_plan, trained_guide, with_choice
+from .plan import budget_of, fits_a_wave, make_plan, trained_guide, with_choice
 from .prepared_scene import PreparedScene
 from .sole_use import SoleUse
 
@@ -116,7 +116,7 @@ class Session:
             scene, values["camera"], values["size"], values["up"], values["view"], values["fov"]
         )
         # before work, for what takes least; again when the memory of the scene is known
-        settings.budget(camera.size, values["executor"] or "threads")
+        budget_of(settings, camera.size, values["executor"] or "threads")
         self._scene = PreparedScene(scene, settings, camera, camera if framed else None)
         if camera.sensor is None:
             settings = self._settings = settings.ending(self._scene.light_is_chosen)
@@ -314,7 +314,7 @@ class Session:
         )
         self._scene.compiled.view(camera)  # checks its distance
         executor = settings.executor_for(camera.size)
-        budget = settings.budget(camera.size, executor, self._plan.tracer.recorded_aovs)
+        budget = budget_of(settings, camera.size, executor, self._plan.tracer.recorded_aovs)
         accumulator = Accumulator(camera.size, self._plan.tracer.recorded_aovs, values["caustics"])
         with self.interrupt_handler, self._use:
             self._render.discard_sweeps()

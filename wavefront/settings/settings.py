@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from typing import Any, Unpack
 
 import numpy as np
@@ -14,7 +14,6 @@ from ..film.exact_sum import MAX_TERMS
 from ..integrators import INTEGRATORS, li_full
 from ..integrators.tuning import BRANCHES
 from ..sampling.sampler import SAMPLERS, SamplerMaker, make_sampler
-from ..scheduling.budget import Budget, make_budget
 from ..scheduling.executors import ExecutorLike, choose_executor, worker_count
 from ..stages.reuse import SHARED_WAYS
 from .checks import AUTO, whole_number
@@ -195,21 +194,6 @@ class Settings:
         branches = self.values["branches"] if isinstance(self.values["branches"], int) else 1
         paths = size[0] * size[1] * self.max_spp * branches
         return choose_executor(self.values["executor"], self.worker_count, paths)
-
-    def budget(
-        self, size: tuple[int, int], executor: str | ExecutorLike, layers: Sequence[str] = ()
-    ) -> Budget:
-        """Return the workers, and the largest wave, for a picture of a size (width, height) with layers."""
-        most, processes = self.values["max_memory"], executor != "threads"
-        return make_budget(
-            None if most is None else int(most),
-            size,
-            self.worker_count,
-            self.values["wave_size"],
-            processes,
-            layers,
-            self.values["caustics"],
-        )
 
     def _most_samples(self) -> int:
         ways = self.most_branches * (SHARED_WAYS if self.values["reuse"] is True else 1)
