@@ -17,7 +17,7 @@ from unittest.mock import patch
 import numpy as np
 
 import wavefront as wf
-from wavefront.scheduling import jobs
+from wavefront.drive import jobs
 
 sys.path.insert(0, str(Path(__file__).parent.parent / "examples"))
 from cornell_box import cornell_box

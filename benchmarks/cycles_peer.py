@@ -13,7 +13,7 @@ import trimesh
 from mitsuba_scene import texels_of
 
 import wavefront as wf
-from wavefront.scheduling.executors import worker_count
+from wavefront.workers.executors import worker_count
 
 SPHERE_SUBDIVISIONS = 5  # 20 480 triangles: Cycles has no spheres
 

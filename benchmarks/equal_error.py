@@ -37,8 +37,8 @@ from random_rooms import ROOMS
 from scipy.ndimage import gaussian_filter
 
 import wavefront as wf
-from wavefront.session import plan
-from wavefront.session.choice import Choice
+from wavefront.drive import plan
+from wavefront.drive.choice import Choice
 from wavefront.settings import Settings
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "tests"))

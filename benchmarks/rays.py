@@ -30,7 +30,7 @@ from numpy.typing import NDArray
 
 from wavefront.accel import Accelerator, Geometry, make_accelerator
 from wavefront.accel.build import build_tree
-from wavefront.scheduling.pool import WorkerPool
+from wavefront.workers.pool import WorkerPool
 
 f4 = np.float32
 Array = NDArray[np.float32]

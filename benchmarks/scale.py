@@ -34,10 +34,10 @@ import numpy as np
 from distributed import Client, LocalCluster
 
 import wavefront as wf
+from wavefront.drive.jobs import WaveResult
 from wavefront.film.film import Film
-from wavefront.scheduling.jobs import WaveResult
-from wavefront.scheduling.payload import pack
-from wavefront.scheduling.pool import WorkerPool
+from wavefront.workers.pool import WorkerPool
+from wavefront.workers.remote import pack
 
 sys.path.insert(0, str(Path(__file__).parent.parent / "examples"))
 from cornell_box import cornell_box

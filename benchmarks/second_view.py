@@ -21,7 +21,7 @@ import trimesh
 
 import wavefront as wf
 from wavefront.accel import cache
-from wavefront.scheduling import processes
+from wavefront.workers import processes
 
 
 def bumpy_ball(subdivisions: int) -> wf.Scene:

@@ -155,7 +155,7 @@ def set_clock(monkeypatch: pytest.MonkeyPatch) -> Callable[[Callable[[], float]]
 @pytest.fixture
 def long_ago(monkeypatch: pytest.MonkeyPatch) -> None:
     """Let every render count as one that takes long, after which hints are shown."""
-    from wavefront.session import hints
+    from wavefront.drive import hints
 
     monkeypatch.setattr(hints, "LONG", 0.0)
 
@@ -195,7 +195,7 @@ def close_tiles(monkeypatch: pytest.MonkeyPatch) -> None:
 @pytest.fixture
 def no_estimates(monkeypatch: pytest.MonkeyPatch) -> None:
     """Let jobs be admitted until `seconds` are over: what they cost is not known where a machine stutters."""
-    from wavefront.scheduling.scheduler import Scheduler
+    from wavefront.drive.work import Scheduler
 
     def late(scheduler: Scheduler, lanes: int) -> bool:
         return scheduler._seconds is not None and scheduler.elapsed > scheduler._seconds
@@ -241,7 +241,7 @@ def tables_restored() -> Iterator[None]:
     from wavefront.lights.samplers import LIGHT_SAMPLERS
     from wavefront.sampling.filters import FILTERS
     from wavefront.sampling.sampler import SAMPLERS
-    from wavefront.scheduling.executors import EXECUTORS
+    from wavefront.workers.executors import EXECUTORS
 
     tables = [ACCELERATORS, EXECUTORS, FILTERS, IMAGE_READERS, IMAGE_WRITERS, INTEGRATORS, LIGHT_SAMPLERS]
     tables += [READERS, SAMPLERS]

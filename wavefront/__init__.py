@@ -3,7 +3,6 @@
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
-from . import integrators
 from .accel import Accelerator, Geometry, Intersections
 from .arrays import elementary, vec
 from .arrays.frame import Frame
@@ -32,6 +31,7 @@ from .colors import blackbody, exposure, from_photometric, srgb, to_photometric
 from .core.errors import Interrupted, RenderError, SaveError, SceneError
 from .core.html import register_preview
 from .core.suggestions import did_you_mean
+from .drive import Session
 from .extensions import (
     register_accelerator,
     register_executor,
@@ -72,7 +72,6 @@ from .scene import Scene
 from .scene.lighting import studio
 from .scene.loss import Loss
 from .scene.sun_position import sun_position
-from .session import Session
 from .shapes import (
     Box,
     Capsules,

@@ -21,7 +21,7 @@ from .lights.samplers import LIGHT_SAMPLERS
 from .sampling.filters import FILTERS, Filter
 from .sampling.sampler import SAMPLERS, SamplerMaker
 from .scene import Scene
-from .scheduling.executors import EXECUTORS, ExecutorLike
+from .workers.executors import EXECUTORS, ExecutorLike
 
 
 def register_integrator(name: str, integrator: Integrator) -> None:

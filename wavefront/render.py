@@ -5,10 +5,10 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any, Unpack
 
+from .drive import Session
+from .drive.final_checks import interrupted
+from .drive.notebook import run_shown, shows_pictures
 from .image import Image
-from .session import Session
-from .session.final_checks import interrupted
-from .session.notebook import run_shown, shows_pictures
 from .settings import RenderSettings, takes_settings
 
 

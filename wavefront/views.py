@@ -11,9 +11,9 @@ from .camera import Camera, ImageSize
 from .camera.moves import orbit
 from .core.errors import SceneError, iterable
 from .core.suggestions import suggests_keywords
+from .drive import Session
 from .image import Image
 from .io.to_scene import as_scene, choose_camera
-from .session import Session
 from .settings import RenderSettings, refuse, takes_settings, whole_number
 from .settings.checks import check_view
 

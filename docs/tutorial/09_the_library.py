@@ -74,7 +74,7 @@ better.save("2_caustics_and_denoised.png")
 #      - microfacets, layers, textures
 #    * - 4
 #      - ``render``
-#      - ``scheduling/``, ``film/film.py``
+#      - ``drive/``, ``workers/``, ``film/film.py``
 #      - workers, errors of pixels, checkpoints
 #    * - 6
 #      - ``light_sample``

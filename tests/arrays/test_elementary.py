@@ -33,7 +33,7 @@ ALLOWED = {
     "image/comparison.py": 1,
     "image/image.py": 1,
     "sampling/warp.py": 4,
-    "session/diagnosis.py": 4,
+    "drive/diagnosis.py": 4,
     "shapes/height_field.py": 1,
     "statistics/limits.py": 1,
     "statistics/significance.py": 3,

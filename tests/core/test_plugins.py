@@ -73,7 +73,7 @@ def test_each_table_has_a_group_of_its_own() -> None:
     from wavefront.lights.samplers import LIGHT_SAMPLERS
     from wavefront.sampling.filters import FILTERS
     from wavefront.sampling.sampler import SAMPLERS
-    from wavefront.scheduling.executors import EXECUTORS
+    from wavefront.workers.executors import EXECUTORS
 
     tables = [
         *(

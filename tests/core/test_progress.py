@@ -15,9 +15,9 @@ import scenes
 import wavefront as wf
 from wavefront.core import progress as module
 from wavefront.core.progress import DELAY, Bar, phase
+from wavefront.drive import prepared_scene
 from wavefront.io import readers
 from wavefront.io.load import load, load_mesh
-from wavefront.session import prepared_scene
 
 
 def wait_for(text: str, capsys) -> None:
@@ -160,6 +160,6 @@ def test_building_a_scene_is_a_phase(progress, at_once, calls_of, capsys) -> Non
             wait_for("building the scene: 00:07", capsys)
         return compile_scene(*given, **options)
 
-    calls_of("wavefront.session.prepared_scene.compile_scene", slow)
+    calls_of("wavefront.drive.prepared_scene.compile_scene", slow)
     wf.render(scenes.everything(), 1, progress=progress)
     assert progress is None or capsys.readouterr().err == ""

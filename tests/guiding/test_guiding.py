@@ -372,7 +372,7 @@ def test_training_holds_blas_to_one_thread(calls_of: Callable[..., Any]) -> None
         threads.extend(each["num_threads"] for each in libraries if each["user_api"] == "blas")
         return train(*arguments)
 
-    calls_of("wavefront.session.choice.train", spy)
+    calls_of("wavefront.drive.choice.train", spy)
     wf.render([wf.Sphere((0, 0, 0), 1), wf.Environment(1)], 1, size=(8, 8), guide=True, progress=False)
     assert set(threads) == {1}
 

@@ -25,9 +25,9 @@ from significance import assert_same_images, repeat
 import wavefront as wf
 from wavefront import cli
 from wavefront.arrays.vec import f4
+from wavefront.drive import tracing
 from wavefront.film.light_sums import LightSums
 from wavefront.lights.point import PointLightRecord
-from wavefront.scheduling import tracing
 
 SIZE = (24, 18)
 PIXELS = SIZE[0] * SIZE[1]
@@ -131,7 +131,7 @@ def test_no_bit_depends_on_embree_where_numpy_traces(missing: Callable[..., None
 @pytest.mark.parametrize("workers", [2, pytest.param(1, marks=pytest.mark.slow)])
 def test_no_bit_depends_on_a_lack_of_memory(workers: int, fails: Callable[..., Any]) -> None:
     lack = MemoryError("no room")
-    calls = fails("wavefront.scheduling.tracing.trace_light", lack, lambda *given: given[3].size > 300)
+    calls = fails("wavefront.drive.tracing.trace_light", lack, lambda *given: given[3].size > 300)
     image = wf.render(scene(), 8, **EVERY, workers=workers, executor="threads", wave_size=2000)
     assert max(call.args[3].size for call in calls) > 300
     assert digest(image) == whole()

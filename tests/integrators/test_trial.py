@@ -15,13 +15,13 @@ from scenes import cornell_box, everything, room
 
 import wavefront as wf
 from wavefront.accel.counter import RayCounter
+from wavefront.drive import choice
 from wavefront.features.compiling import compile_scene
 from wavefront.integrators import li_full
 from wavefront.integrators import tuning as trial
 from wavefront.integrators.tuning import Run, Trial, TrialJob, TrialPart, li_twins
 from wavefront.sampling.sampler import IndependentSampler, SobolSampler
 from wavefront.sampling.tiles import pixels_of_tiles, place_in_tiles
-from wavefront.session import choice
 from wavefront.settings import Settings
 from wavefront.stages.generate import generate
 

@@ -245,7 +245,7 @@ def test_files_of_earlier_versions_are_not_reliable() -> None:
 def test_a_checkpoint_without_the_record_is_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     path, points = tmp_path / "desk.npz", floor_points()[:4]
     with monkeypatch.context() as patch:
-        patch.setattr("wavefront.session.plan.narrow_aovs", lambda _: ())
+        patch.setattr("wavefront.drive.plan.narrow_aovs", lambda _: ())
         wf.measure(glassy(), points, UP, spp=8, checkpoint=path, **QUIET)
     with pytest.raises(wf.SceneError, match=r"aovs was \['lux'\] and is \['lux', 'narrow_lobes'\]"):
         wf.measure(glassy(), points, UP, spp=16, checkpoint=path, **QUIET)

@@ -10,13 +10,13 @@ from significance import render
 
 import wavefront as wf
 from wavefront.arrays.vec import f4
+from wavefront.drive import final_checks as outcome
+from wavefront.drive import session, tracing
+from wavefront.drive import work as scheduler
+from wavefront.drive.adaptive import MIN_SPP, next_stop, passes
+from wavefront.drive.jobs import SQUARE, CameraJob, Job, JobResult, split_jobs
+from wavefront.drive.work import Scheduler
 from wavefront.film.film import Film
-from wavefront.scheduling import scheduler, tracing
-from wavefront.scheduling.adaptive import MIN_SPP, next_stop, passes
-from wavefront.scheduling.jobs import SQUARE, CameraJob, Job, JobResult, split_jobs
-from wavefront.scheduling.scheduler import Scheduler
-from wavefront.session import final_checks as outcome
-from wavefront.session import session
 
 
 def lit(size: tuple[int, int] = (24, 16)) -> wf.Scene:
@@ -298,7 +298,7 @@ def test_samples_of_waves_that_time_ends_are_discarded(calls_of) -> None:
         while True:
             monitor.check(0, job.view.deadline)
 
-    calls_of("wavefront.session.session.trace_any_job", endless)
+    calls_of("wavefront.drive.session.trace_any_job", endless)
     seconds = 0.5
     image = render(lit(), None, seconds=seconds, wave_size=384)  # one sample of all pixels
     assert image.spp <= 3
@@ -316,7 +316,7 @@ def test_pixels_without_a_sample_are_told(calls_of) -> None:
         while True:
             monitor.check(123, job.view.deadline)
 
-    calls_of("wavefront.session.session.trace_any_job", endless_after_the_first)
+    calls_of("wavefront.drive.session.trace_any_job", endless_after_the_first)
     message = (
         r"288 pixels of 384 have no sample and are black: when seconds=0.5 were over, .* met 123 surfaces"
     )

@@ -3,7 +3,7 @@
 The errors are 0.1 % at most. Printed are all means: `pytest -s -m slow tests/physics/test_equal_means.py`.
 
 So have renders with default settings, which are large enough for the trial that chooses branches and re-use
-(`session/choice.py`): each reference scene again, of at least 192 × 192 pixels.
+(`drive/choice.py`): each reference scene again, of at least 192 × 192 pixels.
 """
 
 import sys
@@ -19,7 +19,7 @@ from scenes import Case
 from significance import ROUNDING, Mean, assert_mean, measure, repeat
 
 import wavefront as wf
-from wavefront.session import choice
+from wavefront.drive import choice
 
 sys.path.insert(0, str(Path(__file__).parents[2] / "benchmarks"))
 from hard_scenes import HARD_SCENES

@@ -14,8 +14,8 @@ import scenes
 
 import wavefront as wf
 from wavefront.core.shared import STOP, SharedInt, Stopped
-from wavefront.scheduling import payload as payloads
-from wavefront.scheduling.pool import WorkerPool
+from wavefront.workers import remote as payloads
+from wavefront.workers.pool import WorkerPool
 
 distributed = pytest.importorskip("distributed")
 QUIET = {"progress": False, "wave_size": 500}
@@ -61,7 +61,7 @@ def test_light_paths_come_from_a_cluster(client: Any, expected: bytes) -> None:
 
 
 def test_a_task_has_several_waves(client: Any, expected: bytes, calls_of: Any) -> None:
-    calls = calls_of("wavefront.scheduling.remote.RemoteWorkers.submit")
+    calls = calls_of("wavefront.workers.remote.RemoteWorkers.submit")
     image = wf.render(scenes.everything(), 8, executor=client, progress=False, wave_size=10)
     assert image.rgb.tobytes() == expected
     jobs = [call.args[1] for call in calls]

@@ -23,10 +23,11 @@ import pytest
 import scenes
 
 import wavefront as wf
-from wavefront.scheduling import executors, jobs, machine, remote
-from wavefront.scheduling.executors import worker_count
-from wavefront.scheduling.payload import Payload
-from wavefront.scheduling.pool import WorkerPool
+from wavefront.drive import jobs
+from wavefront.workers import executors, machine, remote
+from wavefront.workers.executors import worker_count
+from wavefront.workers.pool import WorkerPool
+from wavefront.workers.remote import Payload
 
 needs_fork = pytest.mark.skipif(not sys.platform.startswith("linux"), reason="needs fork")
 QUIET = {"progress": False, "wave_size": 500}

@@ -110,7 +110,7 @@ def test_ctrl_c_while_a_scene_is_set_up() -> None:
 def compile_scene(*_, **__):
     print("compiling", flush=True)
     rest()
-sys.modules["wavefront.session.prepared_scene"].compile_scene = compile_scene
+sys.modules["wavefront.drive.prepared_scene"].compile_scene = compile_scene
 try:
     wf.render(light, 1)
 except wf.Interrupted as stop:

@@ -13,7 +13,7 @@ from scripts import start_python
 
 from wavefront.core.interrupt import InterruptHandler, deferred_signals
 from wavefront.core.shared import STOP, SharedInt
-from wavefront.scheduling.processes import ProcessPool
+from wavefront.workers.processes import ProcessPool
 
 pytestmark = pytest.mark.skipif(not sys.platform.startswith("linux"), reason="signals and processes of Linux")
 SOON = 2.0  # seconds to the prompt

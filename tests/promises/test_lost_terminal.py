@@ -23,7 +23,7 @@ from wavefront import cli
 from wavefront.core import progress
 from wavefront.core.errors import warn_caller
 from wavefront.core.progress import Bar, phase
-from wavefront.session import notebook
+from wavefront.drive import notebook
 
 LINUX = sys.platform.startswith("linux")
 TRIANGLE = "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n"

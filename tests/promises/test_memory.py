@@ -18,8 +18,8 @@ linux = pytest.mark.skipif(not sys.platform.startswith("linux"), reason="limits 
 LIMITED = """
 import resource, sys
 import wavefront as wf
-from wavefront.session import session
-import wavefront.scheduling.processes
+from wavefront.drive import session
+import wavefront.workers.processes
 mesh = wf.Mesh(*{mesh})
 camera = wf.Camera.look_at((0, 0, 4), (0, 0, 0), size=(96, 96))
 scene = wf.Scene([mesh, wf.Sphere((0, -100, 0), 99)], [wf.Environment(1.0)], camera)
@@ -78,7 +78,7 @@ def test_memory_that_is_there_is_not_refused() -> None:
 def test_the_picture_so_far_is_kept_when_memory_runs_out(fails: Any) -> None:
     calls = count()
     fails(
-        "wavefront.scheduling.accumulator.Accumulator.add",
+        "wavefront.drive.accumulator.Accumulator.add",
         MemoryError("no room"),
         lambda *given, **options: next(calls) >= 4,
     )
@@ -88,7 +88,7 @@ def test_the_picture_so_far_is_kept_when_memory_runs_out(fails: Any) -> None:
 
 
 def test_no_memory_for_the_scene_is_an_error_without_a_picture(fails: Any) -> None:
-    fails("wavefront.session.prepared_scene.compile_scene", MemoryError("no room"))
+    fails("wavefront.drive.prepared_scene.compile_scene", MemoryError("no room"))
     with pytest.raises(wf.RenderError, match="out of memory while the scene was set up: no room") as caught:
         wf.render(scenes.everything(), 1, progress=False)
     assert caught.value.image is None

@@ -15,11 +15,11 @@ import scenes
 
 import wavefront as wf
 from wavefront.core.memory import memory_size, resident_memory
+from wavefront.drive import plan as budget
+from wavefront.drive.accumulator import picture_memory
+from wavefront.drive.plan import LANE_BYTES, LEAST_WAVE, PROCESS_BYTES, THREAD_BYTES, make_budget
+from wavefront.drive.work import LARGE_WAVE, SMALL_WAVE
 from wavefront.integrators import li_full
-from wavefront.scheduling import budget
-from wavefront.scheduling.accumulator import picture_memory
-from wavefront.scheduling.budget import LANE_BYTES, LEAST_WAVE, PROCESS_BYTES, THREAD_BYTES, make_budget
-from wavefront.scheduling.scheduler import LARGE_WAVE, SMALL_WAVE
 
 MEGABYTE = 10**6
 PEAKS = Path(__file__).parents[2] / "benchmarks" / "memory.py"

@@ -24,10 +24,10 @@ from threadpoolctl import threadpool_limits
 import wavefront as wf
 from wavefront.camera import Sensors
 from wavefront.core.shared import STOP, SharedInt, Stopped
-from wavefront.scheduling import executors
-from wavefront.scheduling.executors import MIN_PATHS, MIN_PATHS_TO_SPAWN, choose_executor, worker_count
-from wavefront.scheduling.pool import WorkerPool
-from wavefront.scheduling.processes import ProcessPool
+from wavefront.workers import executors
+from wavefront.workers.executors import MIN_PATHS, MIN_PATHS_TO_SPAWN, choose_executor, worker_count
+from wavefront.workers.pool import WorkerPool
+from wavefront.workers.processes import ProcessPool
 
 LINUX = sys.platform.startswith("linux")
 EXECUTORS = ["threads", pytest.param("processes", marks=pytest.mark.skipif(not LINUX, reason="needs fork"))]
@@ -144,7 +144,7 @@ def test_ctrl_c_reaches_the_parent_alone() -> None:
 def test_workers_end_with_their_parent(tmp_path: Path) -> None:
     script = (
         "import os, sys, time\n"
-        "from wavefront.scheduling.pool import WorkerPool\n"
+        "from wavefront.workers.pool import WorkerPool\n"
         "with WorkerPool(lambda k: time.sleep(0.2) or os.getpid(), 2, 'processes') as pool:\n"
         "    for _, pid in pool.run(range(1000)):\n"
         "        print(pid, flush=True)\n"
@@ -208,7 +208,7 @@ def test_a_stop_ends_a_run(executor: str) -> None:
 @pytest.fixture
 def no_busy_threads(calls_of: Any) -> None:
     """No other thread of this process computes, whatever the machine says."""
-    calls_of("wavefront.scheduling.executors._other_threads_compute", lambda: False)
+    calls_of("wavefront.workers.executors._other_threads_compute", lambda: False)
 
 
 @processes

@@ -20,8 +20,8 @@ import scenes
 from threadpoolctl import threadpool_info, threadpool_limits
 
 import wavefront as wf
-from wavefront.scheduling import executors
-from wavefront.scheduling.blas import single_threaded_blas
+from wavefront.workers import executors
+from wavefront.workers.machine import single_threaded_blas
 
 QUIET = {"progress": False, "wave_size": 500}
 LINUX = sys.platform.startswith("linux")

@@ -5,7 +5,7 @@ import pytest
 
 import wavefront as wf
 from wavefront.cli import main
-from wavefront.scheduling.adaptive import QUICK_SPP
+from wavefront.drive.adaptive import QUICK_SPP
 from wavefront.settings.settings import DEFAULT_SPP, LITTLE_NOISE
 
 BALL = wf.Sphere((0, 0, 0), 1)
@@ -90,7 +90,7 @@ def test_measurements_and_data_sets_are_not_denoised(tmp_path, monkeypatch) -> N
 @pytest.mark.parametrize("scene", [BALL, LIT], ids=["chosen light", "own light"])
 def test_what_was_done_is_said(scene, capsys, monkeypatch) -> None:
     """By the bar, by a line at the end, and in the metadata; and how to have it otherwise."""
-    monkeypatch.setattr("wavefront.session.hints.NOTICED", 0.0)
+    monkeypatch.setattr("wavefront.drive.hints.NOTICED", 0.0)
     monkeypatch.setattr("wavefront.core.progress.DELAY", -1.0)
     image = render(scene, progress=None)
     bar, _, line = capsys.readouterr().err.rpartition("hint: ")
@@ -102,7 +102,7 @@ def test_what_was_done_is_said(scene, capsys, monkeypatch) -> None:
 
 
 def test_nothing_is_said_of_what_was_asked_for(capsys, monkeypatch) -> None:
-    monkeypatch.setattr("wavefront.session.hints.NOTICED", 0.0)
+    monkeypatch.setattr("wavefront.drive.hints.NOTICED", 0.0)
     assert render(BALL, 2, progress=None).metadata["end"] is None
     assert "reference" not in capsys.readouterr().err
 

@@ -50,7 +50,7 @@ def test_a_lamp_that_lights_is_left_alone(tmp_path) -> None:
 def test_scenes_made_in_python_are_left_alone(tmp_path, monkeypatch) -> None:
     """Those with shapes or lights of a file, too, and no trial is rendered."""
     scene = wf.load(helmet(tmp_path, 1))
-    monkeypatch.setattr("wavefront.session.own_light._median", None)
+    monkeypatch.setattr("wavefront.drive.prepared_scene._median", None)
     lamp = wf.PointLight((0, 0, 5), 1e-9)
     for made in (wf.Scene(scene.shapes), [wf.Box((0, 0, 0), 1), lamp], scene.add(lamp)):
         assert render(made, 1, size=(8, 8)).metadata["lighting"] is None

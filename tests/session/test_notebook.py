@@ -15,9 +15,9 @@ import numpy as np
 import pytest
 
 import wavefront as wf
+from wavefront.drive import notebook as module
+from wavefront.drive.notebook import in_kernel, run_shown, shows_pictures
 from wavefront.material_ball import ball_png
-from wavefront.session import notebook as module
-from wavefront.session.notebook import in_kernel, run_shown, shows_pictures
 
 BALL = [wf.Sphere((0, 0, 0), 1), wf.Environment(1)]
 

@@ -18,9 +18,9 @@ from scripts import children, end_of, eventually, runs, script, wait_for
 import wavefront as wf
 from wavefront.core.errors import warn_caller
 from wavefront.core.shared import SharedInt
-from wavefront.scheduling import inline, pool
-from wavefront.session import plan
-from wavefront.session import session as module
+from wavefront.drive import inline, plan
+from wavefront.drive import session as module
+from wavefront.workers import pool
 
 LINUX = sys.platform.startswith("linux")
 needs_fork = pytest.mark.skipif(not LINUX, reason="needs fork")
@@ -128,7 +128,7 @@ def test_another_camera_compiles_nothing_and_starts_no_worker(executor, sampler,
     """Its picture is that of a render, also in another size, and when the first one was not finished."""
     options = {"sampler": sampler, "workers": 2, "executor": executor, "wave_size": 300, **QUIET}
     plain = [wf.render(everything(), 6, camera=view(x, size), **options) for x, size in VIEWS]
-    compiled = calls_of("wavefront.session.prepared_scene.compile_scene")
+    compiled = calls_of("wavefront.drive.prepared_scene.compile_scene")
     ending = worker_threads()  # of the renders before, whose pools close in threads of their own
     with wf.Session(everything(), 6, camera=view(0), **options) as session:
         next(session)
@@ -235,7 +235,7 @@ def test_stop_before_there_is_a_picture() -> None:
 def test_drop_ends_a_render_without_a_picture(fails: Any) -> None:
     with wf.Session(everything(), 10_000_000, workers=2, wave_size=2000, **QUIET) as session:
         images = [next(session)]
-        fails("wavefront.session.camera_render.CameraRender.last_image", AssertionError())
+        fails("wavefront.drive.picture.CameraRender.last_image", AssertionError())
         timer = threading.Timer(0.3, session.drop)
         timer.start()
         images.extend(session)

@@ -14,9 +14,9 @@ import pytest
 from scenes import cornell_box
 
 import wavefront as wf
+from wavefront.drive import choice
 from wavefront.integrators.tuning import Run, Trial
 from wavefront.sampling import tiles
-from wavefront.session import choice
 from wavefront.settings import SETTINGS
 from wavefront.settings.combinations import EXCLUSIONS, MEDIA, SETTING_OF, Exclusion, table
 

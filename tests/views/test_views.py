@@ -116,7 +116,7 @@ def test_each_view_is_what_render_gives() -> None:
 
 
 def test_the_scene_is_compiled_once(calls_of: Any) -> None:
-    calls = calls_of("wavefront.session.prepared_scene.compile_scene")
+    calls = calls_of("wavefront.drive.prepared_scene.compile_scene")
     assert len(list(wf.render_many(SCENE, wf.turntable(SCENE, 5, size=(8, 8)), 1, progress=False))) == 5
     assert len(calls) == 1
 

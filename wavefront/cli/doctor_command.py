@@ -21,14 +21,14 @@ from ..bsdfs import Dielectric, Diffuse
 from ..camera import Camera
 from ..core.memory import available_memory
 from ..core.plural import plural
+from ..drive import Session
 from ..lights import Environment
 from ..render import render
 from ..scene import Scene
-from ..scheduling.executors import worker_count
-from ..scheduling.machine import describe_machine
-from ..session import Session
 from ..shapes import Mesh, Rectangle, Sphere
 from ..version import VERSION
+from ..workers.executors import worker_count
+from ..workers.machine import describe_machine
 from .command import add_command
 from .messages import FAULT
 

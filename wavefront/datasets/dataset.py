@@ -15,11 +15,11 @@ from ..codecs.png_jpeg import Gamma
 from ..codecs.white_balance import WhiteBalance
 from ..core.errors import SceneError, iterable, number, one_of
 from ..core.files import make_folder, path_name, read_json, write_json
+from ..drive import Session
 from ..film.aov_names import chosen_aovs
 from ..film.identity import differences
 from ..io.to_scene import as_scene
 from ..scene import Scene
-from ..session import Session
 from ..settings import RenderSettings, refuse, takes_settings
 from .annotated import AnnotatedObject, annotated_objects
 from .bop import BopLayout

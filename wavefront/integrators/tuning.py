@@ -1,4 +1,4 @@
-"""Tuning runs: an integrator on a few tiles of a picture, as choices are made by (session/choice.py).
+"""Tuning runs: an integrator on a few tiles of a picture, as choices are made by (drive/choice.py).
 
 Each run has the same pixels and the same random numbers, which are not those of the picture, so runs with
 other settings differ by what the settings do. Errors come from blocks of samples, and costs from rays that

@@ -10,11 +10,11 @@ from numpy.typing import ArrayLike
 
 from ..camera import Sensors
 from ..core.errors import SceneError
+from ..drive import Session
 from ..film.aov_names import chosen_aovs
 from ..io.to_scene import as_scene
 from ..render import finish
 from ..scene import Scene
-from ..session import Session
 from ..settings import AUTO, RenderSettings, refuse, takes_settings
 from .measurement import Measurement
 

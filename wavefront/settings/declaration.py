@@ -29,8 +29,8 @@ from ..sampling.filters import FILTERS, Filter
 from ..sampling.sampler import SAMPLERS, SamplerMaker
 from ..scene.lighting import DEFAULT, LIGHTINGS
 from ..scene.scene import FRAMING_FOV, FRAMING_VIEW, VIEWS
-from ..scheduling.executors import EXECUTORS, ExecutorLike
 from ..shapes.smoothing import check_smooth
+from ..workers.executors import EXECUTORS, ExecutorLike
 from .checks import (
     AUTO,
     SettingCheck,

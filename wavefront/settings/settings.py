@@ -14,8 +14,8 @@ from ..film.exact_sum import MAX_TERMS
 from ..integrators import INTEGRATORS, li_full
 from ..integrators.tuning import BRANCHES
 from ..sampling.sampler import SAMPLERS, SamplerMaker, make_sampler
-from ..scheduling.executors import ExecutorLike, choose_executor, worker_count
 from ..stages.reuse import SHARED_WAYS
+from ..workers.executors import ExecutorLike, choose_executor, worker_count
 from .checks import AUTO, whole_number
 from .combinations import check_combinations
 from .declaration import SETTINGS, AllSettings

@@ -19,8 +19,8 @@ from ..codecs.tone import TONES
 from ..core.errors import RenderError, SceneError, one_of
 from ..denoising import FEW, is_quick
 from ..image import Image
-from ..scheduling.heap import trim_heap
 from ..settings import DEFAULT_SPP
+from ..workers.machine import trim_heap
 from .background_denoiser import BackgroundDenoiser
 from .first_paint import FirstPaint, asked_first
 from .guard import Guard, take_values

@@ -8,8 +8,8 @@ from collections.abc import Callable
 
 from ..arrays.soa import soa
 from ..camera import Camera
+from ..drive import Session
 from ..image import Image
-from ..session import Session
 
 FIRST_DIVISOR = 4  # of the width and height of the first picture of a view; more would leave little to see
 TOO_LONG, SHORT = 0.06, 0.015  # seconds for the first picture of a view; the next one is smaller, or larger

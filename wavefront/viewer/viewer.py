@@ -15,14 +15,14 @@ from ..camera import Camera
 from ..codecs.tone import TONES
 from ..core.errors import RenderError, SceneError, one_of
 from ..core.suggestions import suggests_keywords
+from ..drive import Session
+from ..drive.notebook import in_kernel
 from ..image import Image
 from ..io.to_scene import COLORING, as_scene, choose_camera, coloring_of
 from ..scene import Scene
 from ..scene.state import scene_state
-from ..scheduling.executors import choose_executor, needs_pickling, worker_count
-from ..session import Session
-from ..session.notebook import in_kernel
 from ..settings import DEFAULT_SPP, RenderSettings, refuse, takes_settings
+from ..workers.executors import choose_executor, needs_pickling, worker_count
 from .guard import token_of
 from .priority import giving_way
 from .refiner import FIRST_DIVISOR, Refiner, ViewerFrame

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import shlex
+import threading
 import time
 from collections.abc import Generator, Iterator
 from concurrent.futures import ThreadPoolExecutor
@@ -22,15 +23,11 @@ from ..film.checkpoint import Checkpoint
 from ..image import Image
 from ..integrators.tuning import TrialJob, TrialPart
 from ..io.to_scene import as_scene, choose_camera, coloring_of
-from ..scheduling.accumulator import Accumulator
-from ..scheduling.blas import reserve_buffers
-from ..scheduling.executors import shares_scene
-from ..scheduling.inline import AnyPool, InlineWorker
-from ..scheduling.loop import PassSplitter, doubling, undivided
-from ..scheduling.pool import WorkerPool
-from ..scheduling.tracing import WaveMonitor, trace_any_job
 from ..settings import RenderSettings, Settings, describes_settings, takes_settings
-from .camera_render import CameraRender
+from ..workers.executors import shares_scene
+from ..workers.machine import reserve_buffers
+from ..workers.pool import WorkerPool
+from .accumulator import Accumulator
 from .final_checks import (
     LONG_PATH,
     check_last_image,
@@ -40,9 +37,49 @@ from .final_checks import (
     warn_of_long_paths,
 )
 from .hints import Hints
+from .inline import AnyPool, InlineWorker
+from .picture import CameraRender
 from .plan import budget_of, fits_a_wave, make_plan, trained_guide, with_choice
 from .prepared_scene import PreparedScene
-from .sole_use import SoleUse
+from .tracing import WaveMonitor, trace_any_job
+from .work import PassSplitter, doubling, undivided
+
+
+class SoleUse:
+    """A context that nobody can enter while it is entered: a second one gets an error, and does not wait."""
+
+    def __init__(self) -> None:
+        self._lock = threading.Lock()
+        self._user = 0  # the thread that is within
+
+    def __enter__(self) -> None:
+        """Enter.
+
+        Raises
+        ------
+        RenderError
+            If the context is entered already.
+        """
+        if not self._lock.acquire(blocking=False):
+            by = "another thread" if self.elsewhere else "the caller of this function"
+            raise RenderError(f"the session is in use by {by}; meanwhile it can only be stopped or dropped")
+        self._user = threading.get_ident()
+
+    def __exit__(self, *raised: object) -> None:
+        """Let others enter."""
+        self._user = 0
+        self._lock.release()
+
+    @property
+    def elsewhere(self) -> bool:
+        """Whether another thread is within."""
+        return self._lock.locked() and self._user != threading.get_ident()
+
+    def wait(self) -> None:
+        """Wait until nobody is within."""
+        with self._lock:
+            pass
+
 
 SNAPSHOT_INTERVAL = 1.0  # seconds between two pictures of a long pass
 

@@ -8,9 +8,9 @@ from contextvars import Context, copy_context
 from typing import Any, Self, TypeAlias
 
 from ..core.shared import STOP, Stopped
-from .pool import POLL_INTERVAL, WorkerPool
+from ..workers.contract import WarningsOfJobs, with_warnings
+from ..workers.pool import POLL_INTERVAL, WorkerPool
 from .tracing import WaveMonitor
-from .workers import WarningsOfJobs, with_warnings
 
 
 class InlineWorker:

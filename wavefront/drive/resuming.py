@@ -16,8 +16,8 @@ from ..core.fingerprint import fingerprint
 from ..film.checkpoint import Checkpoint, check_identity, contents_of, other_versions, read_checkpoint
 from ..film.identity import CODE, SCENE
 from ..film.picture_sums import PictureSums
-from ..scheduling.accumulator import Accumulator
 from ..settings import SETTINGS, Settings
+from .accumulator import Accumulator
 from .choice import Choice
 
 OTHERWISE = '; quality="reference" goes on with one of 100 samples that was begun by an earlier version'

@@ -9,9 +9,8 @@ from typing import Any, Protocol, runtime_checkable
 
 from ..core.errors import RenderError, SceneError
 from ..core.shared import SharedInt
-from .payload import Payload
-from .remote import RemoteWorkers
-from .workers import END_TIMEOUT, StoppableWork, all_done
+from .contract import END_TIMEOUT, StoppableWork, all_done
+from .remote import Payload, RemoteWorkers
 
 
 @runtime_checkable

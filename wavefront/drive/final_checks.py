@@ -13,8 +13,8 @@ from ..core.plural import plural
 from ..image import Image
 from ..integrators import INTEGRATORS
 from ..sampling.tiles import others_in_tile
-from ..scheduling.loop import RenderLoop
 from .plan import Plan
+from .work import RenderLoop
 
 LONG_PATH = 1000  # surfaces along a path, after which it will hardly end by itself
 FEWEST_PIXELS = 256  # smaller pictures are measurements and are not checked for being black or white
@@ -152,7 +152,7 @@ def _check_first_samples(image: Image, seconds: float | None, surfaces: int) -> 
 
 def _cause_of_bad_sample(plan: Plan, loop: RenderLoop, pixel: int, sample: int) -> str:
     """Return in which bounce, and at which material, a sample that is not finite became so."""
-    from .nan_trace import first_nan  # here, as most pictures do without
+    from .diagnosis import first_nan  # here, as most pictures do without
 
     camera, pixels = loop.view.camera, np.array([pixel], np.uint32)
     if plan.choice.reuse:

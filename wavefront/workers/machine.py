@@ -1,9 +1,13 @@
-"""BLAS: one thread for each worker, and memory for its calls."""
+"""What workers need of the machine: one thread of BLAS, a heap that is kept; and what bits depend on."""
 
 from __future__ import annotations
 
+import ctypes
 import math
+import platform
+import sys
 import threading
+from contextlib import suppress
 from typing import Any
 
 import numpy as np
@@ -12,6 +16,7 @@ from threadpoolctl import ThreadpoolController
 from ..core.interrupt import deferred_signals
 from ..core.memory import address_space_left, megabytes
 from ..core.plural import plural
+from ..version import VERSION
 
 # Bytes of address space: OpenBLAS takes 32 MB for each call at a time, and a thread its stack.
 BUFFER = 64 << 20
@@ -101,3 +106,83 @@ def reserve_buffers(threads: int) -> None:
         worker.start()
     for worker in workers:
         worker.join()
+
+
+M_TRIM_THRESHOLD, M_MMAP_THRESHOLD = -1, -3  # of glibc's malloc.h
+LARGEST_BLOCK = 31 << 20  # bytes; glibc takes larger blocks from the system in any case
+BLOCKS = 3  # of that size that are kept: a wave of shared paths takes nearly as much
+
+
+def prepare_heap() -> None:
+    """Have glibc keep what is freed, in large pages; with another C library, do nothing of use.
+
+    All memory of a young process is new, and the system hands it out page by page: 11 600 page faults
+    in the first wave. So the heap is grown to what glibc keeps before it gives any back, and NumPy asks for
+    large pages under large arrays. The limits are set since environments may say otherwise: workers of
+    Dask are started with MALLOC_TRIM_THRESHOLD_=65536, and every wave got all of its memory anew, which took
+    twice the time.
+    """
+    with suppress(AttributeError, OSError, TypeError):  # another C library
+        mallopt = ctypes.CDLL(None).mallopt
+        mallopt(M_TRIM_THRESHOLD, BLOCKS * LARGEST_BLOCK)
+        mallopt(M_MMAP_THRESHOLD, LARGEST_BLOCK)
+    with suppress(MemoryError):
+        grown = [np.empty(9 * LARGEST_BLOCK // 10, np.uint8) for _ in range(BLOCKS)]
+        del grown
+
+
+def trim_heap() -> None:
+    """Have glibc give back to the system what is free; with another C library, do nothing."""
+    with suppress(AttributeError, OSError, TypeError):
+        ctypes.CDLL(None).malloc_trim(0)
+
+
+NONE = "none"
+
+
+def describe_machine() -> dict[str, str]:
+    """Return, by name, what the bits of results of this process depend on."""
+    described = {
+        "wavefront": VERSION,
+        "NumPy": np.__version__,
+        "architecture": platform.machine(),
+        "CPU features": " ".join(_cpu_features()) or NONE,
+    }
+    if "embreex" in sys.modules:
+        described["embreex"] = _embreex_version()
+    return described
+
+
+def machine_differences(here: dict[str, str]) -> tuple[str, ...]:
+    """Return in what this process differs from the machine that was described, in words."""
+    there = describe_machine()
+    if "embreex" in here and "embreex" not in there:
+        there["embreex"] = _embreex_version()
+    return tuple(
+        _difference(name, value, there[name]) for name, value in here.items() if there[name] != value
+    )
+
+
+def _difference(name: str, here: str, there: str) -> str:
+    if name != "CPU features":
+        return f"{name} {there} in place of {here}"
+    ours, theirs = set(here.split()), set(there.split())
+    added, missing = " ".join(sorted(theirs - ours)), " ".join(sorted(ours - theirs))
+    parts = [f"{text} {names}" for text, names in (("with", added), ("without", missing)) if names]
+    return f"a CPU {' and '.join(parts)}"
+
+
+def _cpu_features() -> list[str]:
+    """Return the extensions of the processor that NumPy uses; as `np.show_runtime` finds them."""
+    from numpy._core import _multiarray_umath as umath  # type: ignore[attr-defined]
+
+    return [name for name in umath.__cpu_dispatch__ if umath.__cpu_features__[name]]
+
+
+def _embreex_version() -> str:
+    from importlib.metadata import PackageNotFoundError, version
+
+    try:
+        return version("embreex")
+    except PackageNotFoundError:
+        return NONE

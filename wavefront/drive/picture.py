@@ -1,4 +1,4 @@
-"""The render of a scene as one camera sees it."""
+"""The picture of one view while it is rendered: its sums, AOVs, metadata and checkpoint."""
 
 from __future__ import annotations
 
@@ -21,17 +21,16 @@ from ..compile.scene import CompiledScene
 from ..film.aov_names import BEFORE_DENOISING, BOXES, BRIGHTEST, BRIGHTEST_LUX, NARROW, geometric_names
 from ..film.checkpoint import Checkpoint
 from ..image import Image
-from ..scheduling.accumulator import Accumulator
-from ..scheduling.adaptive import Pass
-from ..scheduling.executors import EXECUTORS, waves_per_job
-from ..scheduling.inline import AnyPool
-from ..scheduling.jobs import CameraJob
-from ..scheduling.loop import PassSplitter, RenderLoop
-from ..scheduling.scheduler import Scheduler
-from ..scheduling.tracing import MonitoredAccelerator, WaveMonitor
 from ..version import VERSION
+from ..workers.executors import EXECUTORS, waves_per_job
+from .accumulator import Accumulator
+from .adaptive import Pass
+from .inline import AnyPool
+from .jobs import CameraJob
 from .plan import Plan
 from .resuming import CheckpointFile, render_identity
+from .tracing import MonitoredAccelerator, WaveMonitor
+from .work import PassSplitter, RenderLoop, Scheduler
 
 
 class CameraRender:

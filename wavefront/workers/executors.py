@@ -23,10 +23,7 @@ from typing import Any, TypeAlias
 
 from ..core.errors import SceneError, warn_caller
 from ..core.registry import Registry
-from .blas import reserve_buffers
-from .dask import DaskClient, dask_workers, threads_in
-from .remote import RemoteWorkers
-from .workers import (
+from .contract import (
     ExecutorMaker,
     ExecutorTasks,
     LocalWorkers,
@@ -36,6 +33,9 @@ from .workers import (
     WorkersMaker,
     shares_memory,
 )
+from .dask import DaskClient, dask_workers, threads_in
+from .machine import reserve_buffers
+from .remote import RemoteWorkers
 
 MIN_PATHS = 1 << 18  # fewer are traced sooner than processes are forked
 MIN_PATHS_TO_SPAWN = 1 << 22  # fewer are traced sooner than processes are spawned

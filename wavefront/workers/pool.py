@@ -16,9 +16,9 @@ from ..arrays.soa import soa
 from ..core.errors import RenderError
 from ..core.interrupt import deferred_signals
 from ..core.shared import AT_ONCE, STOP, SharedInt, Stopped
-from .blas import single_threaded_blas
+from .contract import JobFailed, StoppableWork, Workers, all_done
 from .executors import EXECUTORS, ExecutorLike
-from .workers import JobFailed, StoppableWork, Workers, all_done
+from .machine import single_threaded_blas
 
 Job = TypeVar("Job")
 Result = TypeVar("Result")

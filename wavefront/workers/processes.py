@@ -26,9 +26,9 @@ from typing import Any
 
 from ..core.interrupt import SIGNALS
 from ..core.shared import AT_ONCE, SharedInt
-from .heap import prepare_heap
+from .contract import POLL_INTERVAL, LocalWorkers, StoppableWork, all_done, submitted
+from .machine import prepare_heap
 from .remote import RemoteWorkers
-from .workers import POLL_INTERVAL, LocalWorkers, StoppableWork, all_done, submitted
 
 END_TIMEOUT = 1.0  # seconds that processes have to end by themselves
 TERM_TIMEOUT = 0.2  # seconds from SIGTERM to SIGKILL

@@ -1,0 +1,5 @@
+"""What drives a render: the session, the picture, the work, and the choices that are made for them."""
+
+from .session import Session
+
+__all__ = ["Session"]
