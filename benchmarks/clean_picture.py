@@ -4,7 +4,8 @@ python benchmarks/clean_picture.py --bpy-python PATH [--scene NAME] [--size 192]
 
 All denoise by Open Image Denoise. The eight scenes of clean_scenes.py. Sides: `wf.render(scene, spp,
 denoise=True)`; Mitsuba's `llvm_ad_rgb` with its default sampler, whose pictures, albedo and normals this
-package denoises; Cycles with its own use of that library. Pictures are compared with a converged one. FLIP
+package denoises; Cycles with its own use of that library, at numbers of samples and, as "adaptive", at
+thresholds of its adaptive sampling. Pictures are compared with a converged one. FLIP
 (Andersson et al. 2020) is that of sRGB codes of the pictures as they are, at 67 pixels per degree, its mean
 over the pixels.
 
@@ -32,18 +33,24 @@ from references import References, relative_mse
 
 import wavefront as wf
 
-Side = Callable[[int, int], tuple[np.ndarray, float]]  # spp, seed -> picture, CPU seconds
+Side = Callable[[float, int], tuple[np.ndarray, float]]  # spp or threshold, seed -> picture, CPU seconds
 ROOMS = ("Cornell box", "ceiling")  # whose converged pictures are by shared paths
-COUNTS = {"wavefront": (1, 4, 16, 64), "mitsuba": (4, 16, 64), "cycles": (4, 16, 64)}
+COUNTS: dict[str, tuple[float, ...]] = {
+    "wavefront": (1, 4, 16, 64),
+    "mitsuba": (4, 16, 64),
+    "cycles": (4, 16, 64),
+    "adaptive": (1, 0.2, 0.05, 0.02),
+}
+MOST = 1024  # samples per pixel of adaptive sampling
 GUIDES = ("denoising_albedo", "denoising_normal")
 
 
 def ours(scene: wf.Scene, max_bounces: int, python: str | None) -> Side:
     """Return the side of this package."""
 
-    def render(spp: int, seed: int) -> tuple[np.ndarray, float]:
+    def render(spp: float, seed: int) -> tuple[np.ndarray, float]:
         begin = cpu()
-        image = wf.render(scene, spp, seed=seed, max_bounces=max_bounces, denoise=True, progress=False)
+        image = wf.render(scene, int(spp), seed=seed, max_bounces=max_bounces, denoise=True, progress=False)
         return image.rgb, cpu() - begin
 
     return render
@@ -56,10 +63,12 @@ def mitsuba(scene: wf.Scene, max_bounces: int, python: str | None) -> Side:
     mi.set_variant("llvm_ad_rgb")
     loaded = to_mitsuba(mi, scene, max_bounces, guides=True)
 
-    def render(spp: int, seed: int) -> tuple[np.ndarray, float]:
+    def render(spp: float, seed: int) -> tuple[np.ndarray, float]:
         begin = cpu()
-        layers = np.split(np.array(mi.render(loaded, spp=spp, seed=seed)), 3, axis=2)
-        image = wf.Image(layers[0], spp, layers=dict(zip(GUIDES, layers[1:], strict=True))).denoise("oidn")
+        layers = np.split(np.array(mi.render(loaded, spp=int(spp), seed=seed)), 3, axis=2)
+        image = wf.Image(layers[0], int(spp), layers=dict(zip(GUIDES, layers[1:], strict=True))).denoise(
+            "oidn"
+        )
         return image.rgb, cpu() - begin
 
     return render
@@ -70,14 +79,26 @@ def cycles(scene: wf.Scene, max_bounces: int, python: str | None) -> Side:
     assert python is not None
     peer = Cycles(python, scene, 1, max_bounces, denoise=True)
 
-    def render(spp: int, seed: int) -> tuple[np.ndarray, float]:
+    def render(spp: float, seed: int) -> tuple[np.ndarray, float]:
         begin = cpu(peer.process.pid)
         return peer.picture(spp)[..., :3], cpu(peer.process.pid) - begin
 
     return render
 
 
-SIDES = {"wavefront": ours, "mitsuba": mitsuba, "cycles": cycles}
+def adaptive(scene: wf.Scene, max_bounces: int, python: str | None) -> Side:
+    """Return the side of Cycles with adaptive sampling, by its threshold."""
+    assert python is not None
+    peer = Cycles(python, scene, 1, max_bounces, denoise=True)
+
+    def render(threshold: float, seed: int) -> tuple[np.ndarray, float]:
+        begin = cpu(peer.process.pid)
+        return peer.picture(MOST, threshold)[..., :3], cpu(peer.process.pid) - begin
+
+    return render
+
+
+SIDES = {"wavefront": ours, "mitsuba": mitsuba, "cycles": cycles, "adaptive": adaptive}
 
 
 def cpu(process: int | None = None) -> float:
@@ -129,7 +150,8 @@ def measure(name: str, options: argparse.Namespace) -> None:
             for spp, cell in zip(COUNTS[side], rows[side], strict=True):
                 seconds, beyond = time_to(cell[column], mine, times)
                 mark = "*" if beyond else "<" if cell[column] > mine[0] else ""
-                print(f"  to the {key} of {side} at {spp} spp: {cell[2] / seconds:.2f} times as fast{mark}")
+                at = f"threshold {spp}" if side == "adaptive" else f"{spp} spp"
+                print(f"  to the {key} of {side} at {at}: {cell[2] / seconds:.2f} times as fast{mark}")
 
 
 if __name__ == "__main__":

@@ -49,9 +49,12 @@ class Cycles:
         """Render, and return the seconds that Cycles took."""
         return float(self._answers("again")["SECONDS"])
 
-    def picture(self, spp: int | None = None) -> np.ndarray:
-        """Render, with another number of samples if given, and return the picture (H, W, 3)."""
-        return wf.Image.load(self._answers("write" if spp is None else f"write {spp}")["PICTURE"]).rgb
+    def picture(self, *given: float) -> np.ndarray:
+        """Render and return the picture (H, W, 3).
+
+        Another number of samples may be given, and with it the threshold of adaptive sampling.
+        """
+        return wf.Image.load(self._answers(" ".join(map(str, ("write", *given))))["PICTURE"]).rgb
 
     def _answers(self, line: str) -> dict[str, str]:
         """Return what Cycles says, by its first word."""

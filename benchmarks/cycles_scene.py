@@ -163,9 +163,12 @@ def main() -> None:
     add_camera(job["camera"])
     settings(job)
     for seed, line in enumerate(sys.stdin):
-        action, *samples = line.split()
-        bpy.context.scene.cycles.seed = seed
-        bpy.context.scene.cycles.samples = int(samples[0]) if samples else job["spp"]
+        action, *given = line.split()
+        cycles = bpy.context.scene.cycles
+        cycles.seed, cycles.samples = seed, int(given[0]) if given else job["spp"]
+        cycles.use_adaptive_sampling = len(given) > 1
+        if cycles.use_adaptive_sampling:
+            cycles.adaptive_threshold, cycles.adaptive_min_samples = float(given[1]), 4
         begin = time.perf_counter()
         bpy.ops.render.render(write_still=action == "write")
         print(f"PICTURE {bpy.context.scene.render.filepath}")
