@@ -217,7 +217,7 @@ def principled_recorded(calls_of: Callable[..., list[Call]]) -> None:
             self.given = bound.arguments
             super().__init__(0.5)
 
-    calls_of("wavefront.io.appearance.Principled", Recorder)
+    calls_of("wavefront.io.description.appearance.Principled", Recorder)
 
 
 @pytest.fixture

@@ -106,7 +106,7 @@ if TYPE_CHECKING:
     from .io.foreign import from_open3d
     from .io.load import from_mitsuba, from_trimesh, load, load_mesh
     from .io.materialx import load_materialx
-    from .io.pyvista_objects import from_pyvista
+    from .io.pyvista.objects import from_pyvista
     from .io.sources import LoadLimits
     from .io.volumes import load_grid
     from .measuring import (
@@ -135,7 +135,7 @@ _LATER = {  # what many programs do without is imported when they ask for it
     ".io.foreign": ("from_open3d",),
     ".io.load": ("from_mitsuba", "from_trimesh", "load", "load_mesh"),
     ".io.materialx": ("load_materialx",),
-    ".io.pyvista_objects": ("from_pyvista",),
+    ".io.pyvista.objects": ("from_pyvista",),
     ".io.sources": ("LoadLimits",),
     ".io.volumes": ("load_grid",),
     ".measuring": (

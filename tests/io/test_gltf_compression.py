@@ -14,7 +14,7 @@ from gltf_builder import Builder
 
 import wavefront as wf
 from wavefront.core.errors import SceneError
-from wavefront.io.gltf_compression import claimed
+from wavefront.io.gltf.compression import claimed
 
 GRID = np.array([[x, y, x * y / 4] for y in range(4) for x in range(4)], np.float32)
 FACES = np.array(
@@ -74,7 +74,7 @@ def test_draco(path: Path) -> None:
 
 def test_a_mesh_without_compression_needs_no_library(path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     build = draco(plain=True).gltf(path)
-    monkeypatch.setattr("wavefront.io.gltf_meshes.find_spec", lambda name: None)
+    monkeypatch.setattr("wavefront.io.gltf.meshes.find_spec", lambda name: None)
     monkeypatch.setitem(sys.modules, "DracoPy", None)
     (mesh,) = wf.load(build, strict=True).shapes
     np.testing.assert_array_equal(mesh.vertices, GRID)  # type: ignore[attr-defined]
@@ -175,7 +175,7 @@ def test_meshopt(path: Path) -> None:
 def test_without_meshopt_the_error_says_how_to_get_it(path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     meshopt(path)
     monkeypatch.setitem(sys.modules, "meshopt", None)
-    monkeypatch.setattr("wavefront.io.gltf_document.find_spec", lambda name: None)
+    monkeypatch.setattr("wavefront.io.gltf.document.find_spec", lambda name: None)
     message = r"EXT_meshopt_compression needs a library: pip install meshopt, or wavefront\[gltf\]; left out"
     with pytest.raises(SceneError, match=message):
         wf.load(path)

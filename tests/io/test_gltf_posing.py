@@ -10,7 +10,7 @@ import pytest
 from gltf_builder import TRIANGLE, Builder
 
 import wavefront as wf
-from wavefront.io.gltf_posing import Bend, Skin, pose
+from wavefront.io.gltf.posing import Bend, Skin, pose
 from wavefront.io.repair import RawMesh
 
 TURN = np.array([[0, -1, 0], [1, 0, 0], [0, 0, 1]])  # a quarter about z

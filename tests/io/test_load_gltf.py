@@ -18,8 +18,9 @@ from wavefront.arrays.state import SurfaceInteraction
 from wavefront.bsdfs import Dielectric, Diffuse, ThinDielectric
 from wavefront.codecs.encoding import srgb_to_linear
 from wavefront.core.errors import SceneError
-from wavefront.io import gltf_document, placing
-from wavefront.io.gltf_materials import KNOWN
+from wavefront.io.description import placing
+from wavefront.io.gltf import document as gltf_document
+from wavefront.io.gltf.materials import KNOWN
 from wavefront.io.load import from_trimesh, load, load_mesh, load_meshes
 from wavefront.io.sources import LoadLimits
 from wavefront.lights import DirectionalLight, SpotLight

@@ -8,7 +8,7 @@ import pytest
 
 from wavefront.io.load import load, load_mesh
 from wavefront.io.polygons import fans, fans_by_size, triangulate, turned_fans
-from wavefront.io.pyvista_objects import from_pyvista
+from wavefront.io.pyvista.objects import from_pyvista
 
 L = [(-1, -1), (1, -1), (1, 0), (0, 0), (0, 1), (-1, 1)]
 DART = [(-1, -1), (0, -0.5), (1, -1), (0, 1)]

@@ -13,9 +13,9 @@ from ..core.suggestions import suggests_keywords
 from ..scene import Scene
 from ..shapes import Capsules, Shape
 from ..shapes.smoothing import AUTO, check_smooth
-from .appearance import assign_material
 from .clouds import cloud
-from .contents import Contents
+from .description.appearance import assign_material
+from .description.contents import Contents
 from .losses import Losses
 from .repair import RawMesh, Table, build
 

@@ -11,8 +11,8 @@ from ..arrays.vec import Doubles
 from ..core.errors import SceneError, finite_array
 from ..materials import MaterialLike, as_material
 from ..shapes import Mesh
+from .description.placing import moved_raw
 from .losses import Losses
-from .placing import moved_raw
 from .repair import RawMesh, build
 
 COLUMNS = ("vertices", "normals", "uvs", "uvs1", "tangents", "colors")

@@ -19,12 +19,13 @@ from ..materials import MaterialLike
 from ..scene import Scene
 from ..shapes import Instance, Mesh, Shape
 from ..shapes.smoothing import AUTO, check_smooth
-from . import trimesh_objects, trimesh_view
+from .description.placing import place_meshes, place_shapes
 from .joining import join
 from .losses import Losses
-from .placing import place_meshes, place_shapes
 from .readers import LoadOptions, mesh_reader, read
 from .sources import LoadLimits, PathLike, SceneFiles, checked_limits, folders
+from .trimesh import objects as trimesh_objects
+from .trimesh import view as trimesh_view
 
 T = TypeVar("T")
 ALL_OF_THE_LIGHT = (".xml", ".pbrt", ".xml.gz", ".pbrt.gz")  # scenes of renderers, which show no other light

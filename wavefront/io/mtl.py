@@ -50,7 +50,7 @@ from ..core.errors import SceneError, exact, passed_limit, printable
 from ..materials import Material
 from ..textures.image import Texture
 from ..textures.normal_map import BaseNormalMap, BumpMap, NormalMap
-from .appearance import MaterialSpec, build_material
+from .description.appearance import MaterialSpec, build_material
 from .losses import Losses
 from .mtl_checks import COLORS, LEFT_OUT, NUMBERS, mended
 from .sources import GRAY, SceneFiles

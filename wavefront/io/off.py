@@ -12,11 +12,11 @@ import numpy as np
 from ..core.errors import SceneError
 from ..core.files import decode_text
 from .losses import Losses
-from .ply import NAME, bad_rows, faces_of_rows, note_damage
-from .ply_header import Element, Property
-from .ply_rows import Rows, rows_of_lines
+from .ply.header import Element, Property
+from .ply.meshes import NAME, bad_rows, faces_of_rows, note_damage
+from .ply.rows import Rows, rows_of_lines
 from .repair import RawMesh
-from .trimesh_loading import geometries
+from .trimesh.loading import geometries
 
 HEADERS = {"OFF": [], "COFF": ["colors of vertices"], "NOFF": ["normals"], "STOFF": ["texture coordinates"]}
 VERTEX = [Property(axis, "f8") for axis in "xyz"]

@@ -14,13 +14,16 @@ from ..core.files import decode_text, extension_of
 from ..core.registry import Registry
 from ..scene import Scene
 from ..shapes.smoothing import AUTO
-from . import dae, gltf, mtl, obj, off, ply, stl, threemf
-from .appearance import MaterialSpec, assign_material, from_srgb
+from . import mtl, obj, off, stl, threemf
 from .clouds import cloud
-from .contents import Contents
-from .gltf_materials import GltfMaterials
+from .dae import document as dae
+from .description.appearance import MaterialSpec, assign_material, from_srgb
+from .description.contents import Contents
+from .description.placing import Places
+from .gltf import scene as gltf
+from .gltf.materials import GltfMaterials
 from .losses import Losses
-from .placing import Places
+from .ply import meshes as ply
 from .repair import RawMesh
 from .sources import LoadLimits, PathLike, SceneFiles
 

@@ -21,10 +21,10 @@ from ..core.errors import LimitError, SceneError
 from ..core.plural import plural
 from ..materials import Material
 from ..shapes.transform import IDENTITY, Matrix
-from .appearance import MaterialSpec, assign_material
-from .contents import Contents
+from .description.appearance import MaterialSpec, assign_material
+from .description.contents import Contents
+from .description.placing import Places, in_range
 from .losses import Losses
-from .placing import Places, in_range
 from .repair import RawMesh, Table, with_corners_apart
 from .sources import SceneFiles
 from .xml_checks import check_expanded, look_through

@@ -103,7 +103,7 @@ def _with_scalars(
 ) -> Scene:
     """Return what `render` was given as a `Scene` whose shapes show numbers; arguments as of `as_scene`."""
     if importer(subject) is _from_pyvista:
-        from .pyvista_objects import from_pyvista
+        from .pyvista.objects import from_pyvista
 
         given = {"scalars": coloring.scalars, "cmap": coloring.cmap, "clim": coloring.clim}
         return from_pyvista(subject, smooth=smooth, **given)
@@ -272,7 +272,7 @@ def _imported(geometry: Any, smooth: bool | float | str = AUTO) -> Scene:
 
 
 def _from_pyvista(data: Any, smooth: bool | float | str = AUTO) -> Scene:
-    from .pyvista_objects import from_pyvista
+    from .pyvista.objects import from_pyvista
 
     return from_pyvista(data, smooth=smooth)
 

@@ -7,7 +7,7 @@ from typing import Any
 import pyvista
 
 from ..image import Image
-from ..io.pyvista_objects import from_pyvista
+from ..io.pyvista.objects import from_pyvista
 from ..render import render
 from ..scene import Scene
 

@@ -12,7 +12,7 @@ import numpy as np
 
 from ...arrays.vec import Ints
 from ...core.errors import SceneError
-from ..ply_rows import Rows
+from ..ply.rows import Rows
 from ..repair import RawMesh, Table, with_face_colors
 from .nodes import Node
 

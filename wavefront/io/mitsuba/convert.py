@@ -9,7 +9,7 @@ from typing import Any
 from ...camera import Sensors, SurfaceSensors
 from ...lights import Environment, Sky
 from ...scene import Scene
-from ..conversion import only_one, shown
+from ..description.conversion import only_one, shown
 from ..repair import RawMesh
 from ..sources import SceneFiles
 from . import bsdfs, emitters, shapes, textures  # noqa: F401  they fill the table

@@ -19,7 +19,7 @@ from ...codecs.budget import PER_BYTE
 from ...core.errors import LimitError, SceneError, one_of
 from ...core.suggestions import did_you_mean
 from ...shapes.transform import Matrix
-from ..conversion import check_included, placed
+from ..description.conversion import check_included, placed
 from ..losses import Losses
 from ..sources import SceneFiles
 from ..text_lines import numbers

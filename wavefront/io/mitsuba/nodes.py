@@ -12,9 +12,9 @@ from ...arrays.vec import Doubles
 from ...core.errors import LimitError, SceneError, finite_array, in_brief, one_of
 from ...core.suggestions import did_you_mean
 from ...shapes.transform import Matrix
-from ..conversion import Conversion, Part
+from ..description.conversion import Conversion, Part
+from ..description.placing import in_range
 from ..losses import Losses
-from ..placing import in_range
 from ..xml_checks import MAX_DEPTH
 
 COLORS = ("reflectance", "diffuse_reflectance", "base_color", "color", "albedo", "specular_reflectance")

@@ -19,11 +19,11 @@ from ...shapes.smoothing import corner_angles, facet_normals, same_rows
 from ...shapes.transform import EVEN, Matrix, is_even
 from ...textures.base import BaseTexture
 from ...textures.image import Texture
-from ..conversion import textures_in
+from ..description.conversion import textures_in
+from ..description.placing import moved_raw
 from ..joining import COLUMNS, stacked
 from ..pbrt.shapes import facing
 from ..pbrt.textures import computed
-from ..placing import moved_raw
 from ..repair import RawMesh, build, with_corners_apart
 from ..surfaces import as_meshes, ball
 from ..volumes import parsed_grid

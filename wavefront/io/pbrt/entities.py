@@ -14,7 +14,7 @@ from ...colors.spectrum import blackbody, spectrum_rgb
 from ...core.errors import SceneError
 from ...core.suggestions import did_you_mean
 from ...shapes.transform import Matrix
-from ..conversion import Conversion, Part
+from ..description.conversion import Conversion, Part
 from ..losses import Losses
 from ..spectra import METALS
 from .parser import NUMBERS, Parameter

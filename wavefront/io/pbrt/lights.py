@@ -15,7 +15,7 @@ from ...lights import DirectionalLight, Environment, Light, PointLight, Projecto
 from ...lights.environment import ConstantEnvironment
 from ...lights.ies import Web, WebLight
 from ...textures.image import Texture
-from ..conversion import only_one
+from ..description.conversion import only_one
 from ..losses import Losses
 from ..mitsuba.views import angle_of, half_tangent
 from .entities import Entity, Job, converts

@@ -29,7 +29,7 @@ from ...media import GridMedium, HenyeyGreenstein, Medium
 from ...textures.base import BaseTexture
 from ...textures.image import Texture
 from ...textures.normal_map import BumpMap, NormalMap
-from ..conversion import GRAY
+from ..description.conversion import GRAY
 from .entities import NAMED, Entity, Job, converts, unsupported
 from .textures import Value, clipped, color, computed, fourth_root, scalar, square_root
 

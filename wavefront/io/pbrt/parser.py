@@ -17,7 +17,7 @@ import numpy as np
 from ...core.errors import SceneError, in_brief
 from ...core.files import decode_text
 from ...core.suggestions import did_you_mean
-from ..conversion import PlacedError, check_included, placed
+from ..description.conversion import PlacedError, check_included, placed
 from ..losses import Losses
 from ..sources import SceneFiles
 

@@ -15,7 +15,7 @@ from ...core.errors import SceneError
 from ...sampling.filters import GaussianFilter
 from ...scene import Scene
 from ...shapes.transform import Matrix, rotation, translation
-from ..conversion import placed, shown
+from ..description.conversion import placed, shown
 from ..mitsuba.transforms import looking
 from ..repair import RawMesh
 from ..sources import SceneFiles

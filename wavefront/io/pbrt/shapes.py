@@ -14,11 +14,11 @@ from ...core.errors import SceneError
 from ...shapes import Group, Mesh, Shape, Sphere
 from ...shapes.transform import EVEN, Matrix, is_even
 from ...textures.base import BaseTexture
-from ..conversion import placed, textures_in
-from ..placing import in_range, moved_raw
+from ..description.conversion import placed, textures_in
+from ..description.placing import in_range, moved_raw
 from ..repair import AT_ONCE, RawMesh, build, existing
 from ..surfaces import RINGS, SIDES, over_square
-from ..trimesh_import import import_trimesh
+from ..trimesh.library import import_trimesh
 from .entities import Entity, Job, converts, unsupported
 from .mappings import Mapped, Mapping
 from .materials import material_of

@@ -18,7 +18,7 @@ from ...shapes import Disk, Rectangle, Shape, Sphere
 from ...shapes.transform import Matrix
 from ...textures import Texture
 from ...textures.base import BaseTexture
-from ..placing import moved_raw
+from ..description.placing import moved_raw
 from ..repair import RawMesh, build
 from ..sources import GRAY
 from ..surfaces import revolved, slope

@@ -18,7 +18,7 @@ from ...materials import Material
 from ...textures import NormalMap, Texture, VertexColors
 from ...textures.base import BaseTexture
 from ...textures.image import StoredImage
-from ..gltf_specular_glossiness import F0
+from ..gltf.specular_glossiness import F0
 from ..pbrt.textures import clipped, computed
 from ..repair import RawMesh
 from ..sources import MISSING, SceneFiles

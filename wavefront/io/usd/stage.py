@@ -20,10 +20,10 @@ from ...materials import Material
 from ...scene.loss import NOT_HONORED, Loss
 from ...shapes import Shape, Sphere
 from ...shapes.transform import Matrix
-from ..contents import Contents
-from ..conversion import placed
+from ..description.contents import Contents
+from ..description.conversion import placed
+from ..description.placing import Places, in_range, meters
 from ..losses import Losses
-from ..placing import Places, in_range, meters
 from ..repair import RawMesh
 from ..sources import LoadLimits, SceneFiles
 from ..xml_checks import MAX_DEPTH

@@ -13,12 +13,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..core.errors import SceneError
-from ..core.plural import plural
-from .gltf_compression import DRACO, DracoMesh
-from .gltf_document import Document, normalized
-from .gltf_posing import MORPHED, Bend
-from .repair import Faces, RawMesh, Table, wide
+from ...core.errors import SceneError
+from ...core.plural import plural
+from ..repair import Faces, RawMesh, Table, wide
+from .compression import DRACO, DracoMesh
+from .document import Document, normalized
+from .posing import MORPHED, Bend
 
 READ = ("TEXCOORD_0", "TEXCOORD_1", "COLOR_0")  # attributes of a mesh with a number in their name
 TRIANGLES, STRIP, FAN = 4, 5, 6

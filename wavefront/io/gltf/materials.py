@@ -10,19 +10,19 @@ from typing import Any
 
 import numpy as np
 
-from ..arrays.elementary import log, sin_cos_turns
-from ..arrays.vec import FLOAT32_MAX, Doubles
-from ..core.errors import LimitError, SceneError, printable
-from ..textures.image import StoredImage, Texture
-from ..textures.normal_map import NormalMap
-from ..textures.parameter import MAX_INDEX
-from .appearance import MaterialSpec, build_material
-from .gltf_anisotropy import Direction, RoughnessAlong
-from .gltf_compression import DRACO, MESHOPT
-from .gltf_document import OF_CANDELA, SHOWN, Document, floats, shown
-from .gltf_nodes import INSTANCING
-from .gltf_specular_glossiness import F0, BesideSpecular
-from .sources import GRAY
+from ...arrays.elementary import log, sin_cos_turns
+from ...arrays.vec import FLOAT32_MAX, Doubles
+from ...core.errors import LimitError, SceneError, printable
+from ...textures.image import StoredImage, Texture
+from ...textures.normal_map import NormalMap
+from ...textures.parameter import MAX_INDEX
+from ..description.appearance import MaterialSpec, build_material
+from ..sources import GRAY
+from .anisotropy import Direction, RoughnessAlong
+from .compression import DRACO, MESHOPT
+from .document import OF_CANDELA, SHOWN, Document, floats, shown
+from .nodes import INSTANCING
+from .specular_glossiness import F0, BesideSpecular
 
 WEBP = "EXT_texture_webp"
 WRAPS = {10497: "repeat", 33071: "clamp", 33648: "mirror"}

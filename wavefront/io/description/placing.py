@@ -7,14 +7,14 @@ from typing import Any
 
 import numpy as np
 
-from ..arrays.vec import Bools, Ints
-from ..core.errors import LimitError, SceneError
-from ..materials import Material
-from ..shapes import Instance, Mesh
-from ..shapes.instance import can_place
-from ..shapes.transform import Matrix, moved, moved_tangents
-from .losses import Losses
-from .repair import RawMesh, build
+from ...arrays.vec import Bools, Ints
+from ...core.errors import LimitError, SceneError
+from ...materials import Material
+from ...shapes import Instance, Mesh
+from ...shapes.instance import can_place
+from ...shapes.transform import Matrix, moved, moved_tangents
+from ..losses import Losses
+from ..repair import RawMesh, build
 
 MAX_ELEMENT = 1e100  # of a matrix: the squares of larger elements overflow
 MAX_COPIES = 2**14  # meshes that cannot be instances, because their matrices are singular

@@ -7,19 +7,19 @@ from typing import Any
 
 import numpy as np
 
-from ..bsdfs import Diffuse, Principled
-from ..camera import Camera
-from ..colors import srgb
-from ..colors.maps import ColorMap
-from ..core.errors import SceneError
-from ..materials import Material
-from ..scene import Scene
-from ..shapes import Edges, Mesh, Points, Shape
-from ..shapes.scalars import Coloring
-from ..textures.image import Texture
-from .foreign import LINE
-from .losses import Losses
-from .pyvista_objects import NAME, Look, shapes_of
+from ...bsdfs import Diffuse, Principled
+from ...camera import Camera
+from ...colors import srgb
+from ...colors.maps import ColorMap
+from ...core.errors import SceneError
+from ...materials import Material
+from ...scene import Scene
+from ...shapes import Edges, Mesh, Points, Shape
+from ...shapes.scalars import Coloring
+from ...textures.image import Texture
+from ..foreign import LINE
+from ..losses import Losses
+from .objects import NAME, Look, shapes_of
 
 STYLES = {"wireframe": "edges", "points": "points"}
 

@@ -11,17 +11,17 @@ from typing import Any
 
 import numpy as np
 
-from ..camera import Camera
-from ..core.errors import LimitError, SceneError, exact, printable
-from ..lights import DirectionalLight, PointLight, SpotLight
-from ..shapes.transform import IDENTITY, Matrix
-from .gltf_document import OF_CANDELA, Document, floats, shown
-from .gltf_meshes import Primitive, primitives
-from .gltf_nodes import INSTANCING, Node, count_placements, placements, walk
-from .gltf_posing import Skin, held, pose, read_skin, target_weights
-from .losses import Losses
-from .placing import Places
-from .repair import RawMesh
+from ...camera import Camera
+from ...core.errors import LimitError, SceneError, exact, printable
+from ...lights import DirectionalLight, PointLight, SpotLight
+from ...shapes.transform import IDENTITY, Matrix
+from ..description.placing import Places
+from ..losses import Losses
+from ..repair import RawMesh
+from .document import OF_CANDELA, Document, floats, shown
+from .meshes import Primitive, primitives
+from .nodes import INSTANCING, Node, count_placements, placements, walk
+from .posing import Skin, held, pose, read_skin, target_weights
 
 HEIGHT = 512  # pixels of a camera's picture; files give only its aspect ratio
 

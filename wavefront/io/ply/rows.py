@@ -13,9 +13,9 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from ..arrays.vec import Bools, Doubles, Ints
-from .ply_header import Element, Header, Property
-from .text_lines import NUMBER
+from ...arrays.vec import Bools, Doubles, Ints
+from ..text_lines import NUMBER
+from .header import Element, Header, Property
 
 BYTE_ORDERS: dict[str, Literal["little", "big"]] = {"<": "little", ">": "big"}
 

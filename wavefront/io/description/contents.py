@@ -6,13 +6,13 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
-from ..camera import Camera
-from ..lights import Light
-from ..media import BaseMedium
-from ..shapes import Instance, Mesh, Shape
-from ..shapes.smoothing import AUTO
+from ...camera import Camera
+from ...lights import Light
+from ...media import BaseMedium
+from ...shapes import Instance, Mesh, Shape
+from ...shapes.smoothing import AUTO
+from ..repair import RawMesh
 from .placing import Places
-from .repair import RawMesh
 
 
 @dataclass

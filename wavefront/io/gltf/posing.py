@@ -11,13 +11,13 @@ from typing import Any
 
 import numpy as np
 
-from ..arrays.vec import Doubles, Ints
-from ..core.plural import plural
-from ..shapes.transform import Matrix
-from .gltf_document import Document, floats
-from .losses import Losses
-from .placing import MAX_ELEMENT
-from .repair import RawMesh, Table
+from ...arrays.vec import Doubles, Ints
+from ...core.plural import plural
+from ...shapes.transform import Matrix
+from ..description.placing import MAX_ELEMENT
+from ..losses import Losses
+from ..repair import RawMesh, Table
+from .document import Document, floats
 
 MORPHED = {"POSITION": "vertices", "NORMAL": "normals", "TANGENT": "tangents"}  # attributes with targets
 

@@ -10,11 +10,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..codecs.encoding import to_codes
-from ..core.errors import SceneError
-from ..core.interrupt import repeated_ctrl_c
-from .sources import GRAY, SceneFiles
-from .trimesh_import import import_trimesh
+from ...codecs.encoding import to_codes
+from ...core.errors import SceneError
+from ...core.interrupt import repeated_ctrl_c
+from ..sources import GRAY, SceneFiles
+from .library import import_trimesh
 
 
 class Images:

@@ -6,14 +6,14 @@ from typing import Any
 
 import numpy as np
 
-from ..camera import Camera
-from ..camera.projection import Perspective
-from ..core.errors import SceneError, warn_caller
-from ..lights import DirectionalLight, PointLight, SpotLight
-from ..scene import Scene
-from ..shapes.transform import Matrix
-from . import gltf
-from .losses import Losses
+from ...camera import Camera
+from ...camera.projection import Perspective
+from ...core.errors import SceneError, warn_caller
+from ...lights import DirectionalLight, PointLight, SpotLight
+from ...scene import Scene
+from ...shapes.transform import Matrix
+from ..gltf import scene as gltf
+from ..losses import Losses
 
 SOURCE = "trimesh object"
 KINDS = {"PointLight": "point", "DirectionalLight": "directional", "SpotLight": "spot"}

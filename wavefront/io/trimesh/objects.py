@@ -7,22 +7,22 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..arrays.vec import f4
-from ..bsdfs import Diffuse
-from ..codecs.raster import codes_of
-from ..core.errors import SceneError, printable
-from ..materials import Material
-from ..shapes.transform import Matrix
-from ..textures.image import StoredImage, Texture
-from ..textures.normal_map import NormalMap
-from . import mtl
-from .appearance import MaterialSpec, assign_material, build_material, from_srgb, is_faint
-from .contents import Contents
-from .losses import Losses
-from .mtl import MATTE
-from .placing import Places
-from .repair import RawMesh, Table, with_face_colors
-from .trimesh_import import import_trimesh
+from ...arrays.vec import f4
+from ...bsdfs import Diffuse
+from ...codecs.raster import codes_of
+from ...core.errors import SceneError, printable
+from ...materials import Material
+from ...shapes.transform import Matrix
+from ...textures.image import StoredImage, Texture
+from ...textures.normal_map import NormalMap
+from .. import mtl
+from ..description.appearance import MaterialSpec, assign_material, build_material, from_srgb, is_faint
+from ..description.contents import Contents
+from ..description.placing import Places
+from ..losses import Losses
+from ..mtl import MATTE
+from ..repair import RawMesh, Table, with_face_colors
+from .library import import_trimesh
 
 if TYPE_CHECKING:
     import trimesh

@@ -11,14 +11,14 @@ import zipfile
 from io import BytesIO
 from typing import Any
 
-from ..core.errors import SceneError
-from .contents import Contents
-from .dae_mending import is_doubtful, mended
-from .dae_meshes import DaeMeshes
-from .placing import meters
-from .sources import SceneFiles
-from .trimesh_loading import typed_errors
-from .xml_checks import check_expanded, look_through, total
+from ...core.errors import SceneError
+from ..description.contents import Contents
+from ..description.placing import meters
+from ..sources import SceneFiles
+from ..trimesh.loading import typed_errors
+from ..xml_checks import check_expanded, look_through, total
+from .mending import is_doubtful, mended
+from .meshes import DaeMeshes
 
 LOST = ("instance_controller", "instance_light", "instance_camera", "lines", "linestrips", "animation")
 PRIMITIVES = ("triangles", "polylist", "polygons", "tristrips", "trifans")

@@ -11,19 +11,19 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..arrays.vec import Bools, Doubles, Ints
-from ..core.plural import plural
-from . import mtl
-from .appearance import MaterialSpec, assign_material, from_srgb, is_faint
-from .clouds import cloud
-from .contents import Contents
-from .losses import Losses
-from .placing import Places
-from .ply_header import RGB, read_header, unread
-from .ply_rows import Rows, read_rows
-from .polygons import fans_by_size, triangulate
-from .repair import RawMesh, Table, with_corners_apart
-from .sources import GRAY, SceneFiles
+from ...arrays.vec import Bools, Doubles, Ints
+from ...core.plural import plural
+from .. import mtl
+from ..clouds import cloud
+from ..description.appearance import MaterialSpec, assign_material, from_srgb, is_faint
+from ..description.contents import Contents
+from ..description.placing import Places
+from ..losses import Losses
+from ..polygons import fans_by_size, triangulate
+from ..repair import RawMesh, Table, with_corners_apart
+from ..sources import GRAY, SceneFiles
+from .header import RGB, read_header, unread
+from .rows import Rows, read_rows
 
 NAME = "geometry_0"  # of the mesh
 UVS = (("texture_u", "texture_v"), ("u", "v"), ("s", "t"))  # names of texture coordinates of vertices

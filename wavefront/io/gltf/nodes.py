@@ -10,13 +10,13 @@ from typing import Any
 
 import numpy as np
 
-from ..arrays.vec import Ints
-from ..core.errors import SceneError
-from ..shapes.transform import IDENTITY, Matrix
-from .gltf_document import Document, is_row, shown, table
-from .gltf_meshes import attribute
-from .placing import MAX_ELEMENT, in_range
-from .repair import wide
+from ...arrays.vec import Ints
+from ...core.errors import SceneError
+from ...shapes.transform import IDENTITY, Matrix
+from ..description.placing import MAX_ELEMENT, in_range
+from ..repair import wide
+from .document import Document, is_row, shown, table
+from .meshes import attribute
 
 TOO_LARGE = f"has an element whose size is above {MAX_ELEMENT:g}"
 INSTANCING = "EXT_mesh_gpu_instancing"

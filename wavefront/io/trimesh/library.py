@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from ..core.interrupt import deferred_signals
+from ...core.interrupt import deferred_signals
 
 
 def import_trimesh() -> Any:

@@ -9,15 +9,15 @@ from typing import Any
 
 import numpy as np
 
-from ..arrays.vec import Doubles, f4
-from ..bsdfs import Bsdf, Dielectric, Diffuse, Principled, ThinDielectric
-from ..colors import srgb_to_linear
-from ..materials import Material
-from ..media import Medium
-from ..textures.image import Texture
-from ..textures.normal_map import BaseNormalMap
-from ..textures.vertex_colors import VertexColors
-from .repair import RawMesh, Table
+from ...arrays.vec import Doubles, f4
+from ...bsdfs import Bsdf, Dielectric, Diffuse, Principled, ThinDielectric
+from ...colors import srgb_to_linear
+from ...materials import Material
+from ...media import Medium
+from ...textures.image import Texture
+from ...textures.normal_map import BaseNormalMap
+from ...textures.vertex_colors import VertexColors
+from ..repair import RawMesh, Table
 
 PARAMETERS = frozenset(inspect.signature(Principled).parameters)
 BASES: dict[type[Bsdf], str] = {Diffuse: "reflectance", Principled: "base_color"}

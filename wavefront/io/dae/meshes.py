@@ -7,19 +7,19 @@ from typing import Any
 
 import numpy as np
 
-from ..arrays.vec import Ints
-from ..core.plural import plural
-from ..scene.loss import NOT_HONORED
-from ..shapes.transform import IDENTITY, Matrix
-from .appearance import MaterialSpec, assign_material, from_srgb
-from .contents import Contents
-from .placing import Places
-from .polygons import triangulate, with_holes
-from .repair import RawMesh, Table
-from .sources import SceneFiles
-from .trimesh_import import import_trimesh
-from .trimesh_loading import Images, typed_errors
-from .trimesh_objects import material_spec
+from ...arrays.vec import Ints
+from ...core.plural import plural
+from ...scene.loss import NOT_HONORED
+from ...shapes.transform import IDENTITY, Matrix
+from ..description.appearance import MaterialSpec, assign_material, from_srgb
+from ..description.contents import Contents
+from ..description.placing import Places
+from ..polygons import triangulate, with_holes
+from ..repair import RawMesh, Table
+from ..sources import SceneFiles
+from ..trimesh.library import import_trimesh
+from ..trimesh.loading import Images, typed_errors
+from ..trimesh.objects import material_spec
 
 NONE = np.zeros((0, 3), np.intp)  # triangles
 

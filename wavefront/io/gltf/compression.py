@@ -11,9 +11,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..codecs.budget import Budget
-from ..core.errors import SceneError
-from ..core.plural import plural
+from ...codecs.budget import Budget
+from ...core.errors import SceneError
+from ...core.plural import plural
 
 DRACO = "KHR_draco_mesh_compression"
 MESHOPT = ("EXT_meshopt_compression", "KHR_meshopt_compression")

@@ -11,21 +11,21 @@ from typing import Any, Generic, TypeVar
 
 import numpy as np
 
-from ..arrays.vec import Doubles
-from ..bsdfs import Diffuse, Measured, NullSurface
-from ..core.errors import LimitError, SceneError, exact, finite_array, in_brief, number, one_of
-from ..core.plural import plural
-from ..lights import Environment, Light, Sky
-from ..materials import Material
-from ..media import Isotropic
-from ..shapes import Shape, Sphere
-from ..textures.base import BaseTexture
-from ..textures.image import StoredImage
-from .losses import Losses
-from .repair import RawMesh
-from .sources import GRAY as GRAY_PIXEL
-from .sources import SceneFiles
-from .spectra import read_spectrum
+from ...arrays.vec import Doubles
+from ...bsdfs import Diffuse, Measured, NullSurface
+from ...core.errors import LimitError, SceneError, exact, finite_array, in_brief, number, one_of
+from ...core.plural import plural
+from ...lights import Environment, Light, Sky
+from ...materials import Material
+from ...media import Isotropic
+from ...shapes import Shape, Sphere
+from ...textures.base import BaseTexture
+from ...textures.image import StoredImage
+from ..losses import Losses
+from ..repair import RawMesh
+from ..sources import GRAY as GRAY_PIXEL
+from ..sources import SceneFiles
+from ..spectra import read_spectrum
 
 MOST_INCLUDED = 15  # files inside each other
 GRAY = Material(Diffuse(0.5))

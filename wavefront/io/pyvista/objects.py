@@ -7,22 +7,22 @@ from typing import Any
 
 import numpy as np
 
-from ..arrays.vec import Doubles, Ints
-from ..bsdfs import Diffuse
-from ..colors import srgb
-from ..colors.maps import ColorMap
-from ..core.errors import SceneError, warn_caller
-from ..core.suggestions import suggests_keywords
-from ..materials import Material
-from ..scene import Scene
-from ..shapes import Shape
-from ..shapes.points import point_colors
-from ..shapes.scalars import Coloring, check_count, lengths, map_material
-from ..shapes.smoothing import AUTO
-from ..textures.vertex_colors import VertexColors
-from .foreign import built, capsules, opaque, spheres
-from .polygons import triangulate
-from .repair import RawMesh, Table, with_face_colors
+from ...arrays.vec import Doubles, Ints
+from ...bsdfs import Diffuse
+from ...colors import srgb
+from ...colors.maps import ColorMap
+from ...core.errors import SceneError, warn_caller
+from ...core.suggestions import suggests_keywords
+from ...materials import Material
+from ...scene import Scene
+from ...shapes import Shape
+from ...shapes.points import point_colors
+from ...shapes.scalars import Coloring, check_count, lengths, map_material
+from ...shapes.smoothing import AUTO
+from ...textures.vertex_colors import VertexColors
+from ..foreign import built, capsules, opaque, spheres
+from ..polygons import triangulate
+from ..repair import RawMesh, Table, with_face_colors
 
 NAME = "PyVista"
 GIVEN = "wavefront scalars"  # the name of an array that is given for a dataset
@@ -96,7 +96,7 @@ def from_pyvista(
     """
     coloring = None if scalars is None and cmap is None and clim is None else Coloring(scalars, cmap, clim)
     if hasattr(data, "renderer") and hasattr(data, "window_size"):
-        from .pyvista_plotter import from_plotter
+        from .plotter import from_plotter
 
         if coloring is not None:
             raise SceneError("scalars, cmap and clim are for datasets; a plotter has those of its actors")

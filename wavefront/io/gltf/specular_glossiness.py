@@ -9,11 +9,11 @@ from typing import Any
 
 import numpy as np
 
-from ..arrays.state import SurfaceInteraction
-from ..arrays.vec import Floats, f4
-from ..textures.base import BaseTexture
-from ..textures.image import Texture
-from ..textures.parameter import Color, color
+from ...arrays.state import SurfaceInteraction
+from ...arrays.vec import Floats, f4
+from ...textures.base import BaseTexture
+from ...textures.image import Texture
+from ...textures.parameter import Color, color
 
 F0 = 0.04  # reflectance of a `Principled` of index 1.5 along the normal, which `specular_color` multiplies
 

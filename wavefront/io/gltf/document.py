@@ -19,12 +19,12 @@ from urllib.parse import unquote
 import numpy as np
 from numpy.typing import NDArray
 
-from ..core.errors import LimitError, SceneError, printable
-from ..core.plural import plural
-from ..shapes.transform import Matrix
-from .gltf_compression import MESHOPT, unpacked_view
-from .losses import Losses, Part
-from .sources import MAX_TRIANGLES, SceneFiles
+from ...core.errors import LimitError, SceneError, printable
+from ...core.plural import plural
+from ...shapes.transform import Matrix
+from ..losses import Losses, Part
+from ..sources import MAX_TRIANGLES, SceneFiles
+from .compression import MESHOPT, unpacked_view
 
 COMPONENTS: dict[int, type[np.generic]] = {
     5120: np.int8,

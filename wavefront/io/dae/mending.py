@@ -8,7 +8,7 @@ from xml.etree import ElementTree
 
 import numpy as np
 
-from .text_lines import NUMBER
+from ..text_lines import NUMBER
 
 NUMBERS = re.compile(rb"<(?:\w+:)?(?:p|h|vcount|float_array)\b[^>]*>([^<]*)<")
 # classes of characters: 0 digits and points, 1 signs, 2 exponents, 3 blanks, 4 all others

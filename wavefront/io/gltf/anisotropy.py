@@ -6,11 +6,11 @@ from typing import Any
 
 import numpy as np
 
-from ..arrays.elementary import arctan2
-from ..arrays.state import SurfaceInteraction
-from ..arrays.vec import Floats, f4
-from ..textures.base import BaseTexture
-from ..textures.parameter import scalar
+from ...arrays.elementary import arctan2
+from ...arrays.state import SurfaceInteraction
+from ...arrays.vec import Floats, f4
+from ...textures.base import BaseTexture
+from ...textures.parameter import scalar
 
 
 class RoughnessAlong(BaseTexture):

@@ -1,0 +1,1 @@
+"""Scenes of COLLADA, read by `pycollada`."""

@@ -1,0 +1,1 @@
+"""Scenes of glTF 2.0."""

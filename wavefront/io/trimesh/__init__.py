@@ -1,0 +1,1 @@
+"""Objects of `trimesh`, and files that it reads."""
