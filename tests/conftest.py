@@ -195,7 +195,7 @@ def close_tiles(monkeypatch: pytest.MonkeyPatch) -> None:
 @pytest.fixture
 def no_estimates(monkeypatch: pytest.MonkeyPatch) -> None:
     """Let jobs be admitted until `seconds` are over: what they cost is not known where a machine stutters."""
-    from wavefront.drive.work import Scheduler
+    from wavefront.drive.jobs import Scheduler
 
     def late(scheduler: Scheduler, lanes: int) -> bool:
         return scheduler._seconds is not None and scheduler.elapsed > scheduler._seconds

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import wavefront as wf
-from wavefront.drive.accumulator import picture_memory
+from wavefront.drive.plan import picture_memory
 from wavefront.film import aov_sums
 from wavefront.film.picture_sums import empty_sums
 from wavefront.film.sums import Sums, bytes_per_pixel

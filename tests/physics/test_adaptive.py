@@ -11,11 +11,10 @@ from significance import render
 import wavefront as wf
 from wavefront.arrays.vec import f4
 from wavefront.drive import final_checks as outcome
+from wavefront.drive import jobs as scheduler
 from wavefront.drive import session, tracing
-from wavefront.drive import work as scheduler
 from wavefront.drive.adaptive import MIN_SPP, next_stop, passes
-from wavefront.drive.jobs import SQUARE, CameraJob, Job, JobResult, split_jobs
-from wavefront.drive.work import Scheduler
+from wavefront.drive.jobs import SQUARE, CameraJob, Job, JobResult, Scheduler, split_jobs
 from wavefront.film.film import Film
 
 

@@ -78,7 +78,7 @@ def test_memory_that_is_there_is_not_refused() -> None:
 def test_the_picture_so_far_is_kept_when_memory_runs_out(fails: Any) -> None:
     calls = count()
     fails(
-        "wavefront.drive.accumulator.Accumulator.add",
+        "wavefront.drive.picture.Picture.add",
         MemoryError("no room"),
         lambda *given, **options: next(calls) >= 4,
     )

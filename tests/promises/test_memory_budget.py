@@ -16,9 +16,15 @@ import scenes
 import wavefront as wf
 from wavefront.core.memory import memory_size, resident_memory
 from wavefront.drive import plan as budget
-from wavefront.drive.accumulator import picture_memory
-from wavefront.drive.plan import LANE_BYTES, LEAST_WAVE, PROCESS_BYTES, THREAD_BYTES, make_budget
-from wavefront.drive.work import LARGE_WAVE, SMALL_WAVE
+from wavefront.drive.jobs import LARGE_WAVE, SMALL_WAVE
+from wavefront.drive.plan import (
+    LANE_BYTES,
+    LEAST_WAVE,
+    PROCESS_BYTES,
+    THREAD_BYTES,
+    make_budget,
+    picture_memory,
+)
 from wavefront.integrators import li_full
 
 MEGABYTE = 10**6

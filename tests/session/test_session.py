@@ -235,7 +235,7 @@ def test_stop_before_there_is_a_picture() -> None:
 def test_drop_ends_a_render_without_a_picture(fails: Any) -> None:
     with wf.Session(everything(), 10_000_000, workers=2, wave_size=2000, **QUIET) as session:
         images = [next(session)]
-        fails("wavefront.drive.picture.CameraRender.last_image", AssertionError())
+        fails("wavefront.drive.picture.Picture.last_image", AssertionError())
         timer = threading.Timer(0.3, session.drop)
         timer.start()
         images.extend(session)

@@ -13,8 +13,7 @@ from ..core.plural import plural
 from ..image import Image
 from ..integrators import INTEGRATORS
 from ..sampling.tiles import others_in_tile
-from .plan import Plan
-from .work import RenderLoop
+from .picture import Picture
 
 LONG_PATH = 1000  # surfaces along a path, after which it will hardly end by itself
 FEWEST_PIXELS = 256  # smaller pictures are measurements and are not checked for being black or white
@@ -64,15 +63,17 @@ def warn_of_long_paths(max_bounces: int) -> None:
     )
 
 
-def check_last_image(image: Image, plan: Plan, loop: RenderLoop, surfaces: int) -> None:
+def check_last_image(image: Image, picture: Picture, time_up: bool, surfaces: int) -> None:
     """Warn of what is wrong with the last picture.
 
     Parameters
     ----------
     image
         The picture.
-    plan, loop
-        How it was rendered.
+    picture
+        What it was made from.
+    time_up
+        Whether the render was ended before its time.
     surfaces
         How many surfaces the longest path under way has met.
 
@@ -81,25 +82,26 @@ def check_last_image(image: Image, plan: Plan, loop: RenderLoop, surfaces: int) 
     RenderError
         If there is no picture, or too many samples are not finite.
     """
-    values, accumulator = plan.settings.values, loop.accumulator
-    time_up = loop.stopped or loop.scheduler.time_up
+    settings, values = picture.plan.settings, picture.plan.settings.values
     if time_up:
         _check_first_samples(image, values["seconds"], surfaces)
-    accumulator.bad.report(image, lambda pixel, sample: _cause_of_bad_sample(plan, loop, pixel, sample))
+    picture.bad.report(image, lambda pixel, sample: _cause_of_bad_sample(picture, pixel, sample))
     found = image.metadata
     if values["clamp"] is not None and found["clamped"] > MUCH_LIGHT:
         warn_caller(
             f"clamp={values['clamp']:g} removed {100 * found['clamped']:.1f} % of the light, so the picture "
             'is too dark: raise it; the AOV "clamped" shows where'
         )
-    in_picture = loop.view.camera.sensor is None
+    in_picture = picture.camera.sensor is None
     if in_picture and values["background"] is None and _is_black_or_white(image):
         from .diagnosis import warn_of_black_or_white  # here, as most pictures do without
 
         integrator = INTEGRATORS.label(values["integrator"])
-        warn_of_black_or_white(image, plan.scene, loop.view.camera, integrator, values["max_bounces"])
-    ended = time_up or accumulator.film.count.max() == plan.settings.max_spp
-    asked = values["noise"] is not None and not plan.settings.by_itself
+        warn_of_black_or_white(
+            image, picture.plan.scene, picture.view.camera, integrator, values["max_bounces"]
+        )
+    ended = time_up or picture.film.count.max() == settings.max_spp
+    asked = values["noise"] is not None and not settings.by_itself
     if asked and ended and not found["noise"] <= values["noise"]:
         noise = "unknown" if np.isnan(found["noise"]) else f"{found['noise']:.4g}"
         warn_caller(
@@ -150,12 +152,12 @@ def _check_first_samples(image: Image, seconds: float | None, surfaces: int) -> 
         warn_caller(f"{black}: {why}")
 
 
-def _cause_of_bad_sample(plan: Plan, loop: RenderLoop, pixel: int, sample: int) -> str:
+def _cause_of_bad_sample(picture: Picture, pixel: int, sample: int) -> str:
     """Return in which bounce, and at which material, a sample that is not finite became so."""
     from .diagnosis import first_nan  # here, as most pictures do without
 
-    camera, pixels = loop.view.camera, np.array([pixel], np.uint32)
+    plan, camera, pixels = picture.plan, picture.view.camera, np.array([pixel], np.uint32)
     if plan.choice.reuse:
         every = camera.address(np.arange(camera.size[0] * camera.size[1], dtype=np.uint32))
         pixels = np.append(pixels, others_in_tile(every, pixel, camera.tiles).astype(np.uint32))
-    return first_nan(plan.scene.lighted, plan.tracer, loop.view, pixels, sample)
+    return first_nan(plan.scene.lighted, plan.tracer, picture.view, pixels, sample)

@@ -1,9 +1,9 @@
-"""The picture of one view while it is rendered: its sums, AOVs, metadata and checkpoint."""
+"""The picture of one view while it is rendered: its samples, AOVs, metadata and checkpoint."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Generator
+from collections.abc import Callable, Mapping
 from copy import deepcopy
 from dataclasses import replace
 from typing import Any
@@ -14,27 +14,32 @@ from numpy.typing import NDArray
 from ..aovs.boxes import object_boxes
 from ..aovs.geometric import IDS, geometric_aovs
 from ..aovs.lux import lux_of
+from ..arrays.vec import Bytes
 from ..camera import Camera
 from ..colors import EFFICACY
 from ..compile.brightest import brightest_emitter
-from ..compile.scene import CompiledScene
+from ..core.errors import RenderError, warn_caller
 from ..film.aov_names import BEFORE_DENOISING, BOXES, BRIGHTEST, BRIGHTEST_LUX, NARROW, geometric_names
-from ..film.checkpoint import Checkpoint
+from ..film.checkpoint import Checkpoint, contents_of
+from ..film.film import Film
+from ..film.light_sums import LightSums
+from ..film.picture_sums import PictureSums
 from ..image import Image
+from ..image.image import film_image, last_film_image
+from ..integrators.light_tracing import Splats
 from ..version import VERSION
 from ..workers.executors import EXECUTORS, waves_per_job
-from .accumulator import Accumulator
 from .adaptive import Pass
-from .inline import AnyPool
-from .jobs import CameraJob
-from .plan import Plan
+from .jobs import CameraJob, Job, JobResult, Scheduler, WaveResult
+from .plan import PICTURE_BYTES, SPARE_BYTES, Plan
 from .resuming import CheckpointFile, render_identity
 from .tracing import MonitoredAccelerator, WaveMonitor
-from .work import PassSplitter, RenderLoop, Scheduler
+
+MAX_BAD_SAMPLES = 1e-4  # part of all samples that may be lost to NaN before it is an error
 
 
-class CameraRender:
-    """The render of one camera: its loop, its picture so far, its AOVs and its checkpoint.
+class Picture:
+    """The picture of one view while it is rendered; where there is a checkpoint, it goes on from that.
 
     Parameters
     ----------
@@ -42,88 +47,123 @@ class CameraRender:
         How it is rendered.
     camera
         What sees the scene.
-    accumulator
-        Sums for the picture and its AOVs.
+    sums
+        Those of no samples; `make_budget` checks before that there is memory for them.
     begin
         When it was asked for, by `time.perf_counter`.
 
     Attributes
     ----------
-    camera, accumulator
+    plan, camera, sums
         As given.
-    loop
-        Renders it.
+    bad
+        Samples that were not finite.
+    rays
+        Queries of the accelerator.
+    scheduler
+        Sizes the jobs and keeps the time.
+    view
+        What all jobs have in common.
+    step
+        The pass under way; None before the first one.
     file
         Where its checkpoint is kept; None if that was not asked for.
     """
 
-    def __init__(self, plan: Plan, camera: Camera, accumulator: Accumulator, begin: float) -> None:
-        settings, choice, view = plan.settings, plan.choice, plan.scene.compiled.view(camera)
-        self.camera, self.accumulator = camera, accumulator
-        self._plan, self._view = plan, view
+    def __init__(self, plan: Plan, camera: Camera, sums: PictureSums, begin: float) -> None:
+        settings, choice, (width, height) = plan.settings, plan.choice, camera.size
+        self.plan, self.camera, self.sums = plan, camera, sums
+        self.bad, self.rays = BadSamples(), 0
+        # for the picture so far when memory has run out
+        self._reserve: Bytes | None = np.empty(PICTURE_BYTES * width * height + SPARE_BYTES, np.uint8)
         self._geometric = camera.layers()  # None: not made yet
         self._boxes: list[dict[str, Any]] | None = None
-        self._sweeps: Generator[bool] | None = None
+        self.step: Pass | None = None
         self.file: CheckpointFile | None = None
         if settings.values["samples"] is not None or settings.values["checkpoint"] is not None:
-            accumulator.sums.identity = self.identity()
-        begun = None
-        if settings.values["checkpoint"] is not None:
-            self.file = CheckpointFile(settings.values["checkpoint"], settings.values["checkpoint_interval"])
-            earlier = self.file.resume(accumulator, settings)
-            if earlier is not None:
-                begin -= earlier.state["seconds"]
-                if earlier.pixels is not None:
-                    begun = Pass(earlier.pixels, earlier.state["first"], settings.max_spp)
-        scheduler = Scheduler(
-            begin,
+            sums.identity = self.identity()
+        self.scheduler = Scheduler(
+            begin - self._seconds_before(),
             settings.values["seconds"],
             plan.budget.wave_size,
             plan.budget.workers,
             choice.branches,
             waves_per_job(plan.executor),
         )
-        self.loop = RenderLoop(
-            CameraJob(
-                view, scheduler.deadline, settings.first_sample, choice.branches, choice.reuse, choice.guided
-            ),
-            accumulator,
-            scheduler,
-            spp=settings.max_spp,
-            noise=settings.values["noise"],
-            seconds=settings.values["seconds"],
-            progress=settings.values["progress"],
-            begun=begun,
-            quick=settings.quick,
-            end=settings.end,
+        self.view = CameraJob(
+            plan.scene.compiled.view(camera),
+            self.scheduler.deadline,
+            settings.first_sample,
+            choice.branches,
+            choice.reuse,
+            choice.guided,
         )
 
-    def sweeps(
-        self,
-        pool: AnyPool,
-        monitor: WaveMonitor,
-        wave_done: Callable[[], object],
-        split: PassSplitter,
-    ) -> Generator[bool]:
-        """Return the sweeps of the loop that was begun, or begin it.
+    def _seconds_before(self) -> float:
+        """Go on from the checkpoint, if there is one; return the seconds that were spent before."""
+        settings = self.plan.settings
+        if settings.values["checkpoint"] is None:
+            return 0.0
+        self.file = CheckpointFile(settings.values["checkpoint"], settings.values["checkpoint_interval"])
+        earlier = self.file.resume(self.sums, settings)
+        if earlier is None:
+            return 0.0
+        with contents_of(self.file.path):
+            self._count_earlier(earlier.state)
+        if earlier.pixels is not None:
+            self.step = Pass(earlier.pixels, earlier.state["first"], settings.max_spp)
+        return float(earlier.state["seconds"])
 
-        The geometric AOVs are made while workers trace the first jobs, and stopped as these are.
-        """
-        compiled = self._plan.scene.compiled
-        stoppable = MonitoredAccelerator(compiled.accelerator, monitor, math.inf)
+    # --- Samples --------------------------------------------------------------------------------------
 
-        def done() -> None:
-            self._geometric_aovs(replace(compiled, accelerator=stoppable))
-            wave_done()
+    @property
+    def film(self) -> Film:
+        """The film."""
+        return self.sums.film
 
-        if self._sweeps is None:
-            self._sweeps = self.loop.sweeps(pool, monitor.surfaces, done, split)
-        return self._sweeps
+    @property
+    def samples(self) -> int:
+        """Number of samples on the film."""
+        return int(self.film.count.sum())
 
-    def discard_sweeps(self) -> None:
-        """End the loop."""
-        if self._sweeps is not None:
-            self._sweeps.close()
+    def add(self, job: Job, result: JobResult) -> None:
+        """Add the result of a job, the next of its pixels."""
+        for wave, of_wave in zip(job.waves(), result, strict=True):
+            self._add_wave(wave, of_wave)
+
+    def _add_wave(self, wave: Job, result: WaveResult) -> None:
+        self.film.add(wave.pixels, result.radiance, result.bad)
+        if self.film.light is not None and result.splats is not None:
+            self._add_splats(self.film.light, wave, result.splats)
+        if self.sums.layers is not None:
+            assert result.layers is not None
+            self.sums.layers.add(
+                wave.pixels, result.layers, result.radiance, most=wave.end, dropped=result.bad
+            )
+        self.bad.count_in(wave, result)
+        self.rays += result.rays
+
+    def _add_splats(self, sums: LightSums, wave: Job, splats: Splats) -> None:
+        """Add what the paths from lights of a wave bring, sample by sample."""
+        first, number = wave.view.first_sample + wave.first_sample, splats.path // wave.pixels.size
+        for sample in range(wave.samples):
+            some = splats.take(np.flatnonzero(number == sample))
+            sums.add(first + sample, wave.pixels.size, some.pixel, some.radiance)
+
+    def counts(self) -> dict[str, Any]:
+        """Return numbers of samples and rays, for the metadata of the picture."""
+        return {
+            "spp": self.samples / self.film.count.size,
+            "samples": self.samples,
+            "rays": self.rays,
+            "bad_samples": self.bad.count,
+        }
+
+    def release_reserve(self) -> None:
+        """Free the memory that is kept for the last picture."""
+        self._reserve = None
+
+    # --- Images ---------------------------------------------------------------------------------------
 
     def image(self, cut_short: bool = False) -> Image:
         """Return the picture so far.
@@ -133,9 +173,8 @@ class CameraRender:
         cut_short
             Whether the render ends before its time.
         """
-        image = self.accumulator.image(self.metadata(cut_short))
-        layers = self._geometric_aovs(self._plan.scene.compiled)
-        self._add_aovs(image, {name: layer.copy() for name, layer in layers.items()})
+        image = film_image(self.sums, {**self.metadata(cut_short), **self.counts()}, keep_sums=False)
+        self._add_aovs(image, {name: layer.copy() for name, layer in self.geometric_aovs().items()})
         return image
 
     def last_image(self, cut_short: bool, free_sums: bool) -> Image:
@@ -149,52 +188,20 @@ class CameraRender:
             Whether sums that are not merged may be freed while the picture is made from them, as nothing
             else needs them.
         """
-        keep_sums, metadata = self._plan.settings.values["samples"] is not None, self.metadata(cut_short)
+        keep_sums = self.plan.settings.values["samples"] is not None
+        metadata = {**self.metadata(cut_short), **self.counts()}
         if free_sums and not keep_sums:
-            image = self.accumulator.last_image(metadata)
+            image = last_film_image(self.sums, metadata)
         else:
-            image = self.accumulator.image(metadata, keep_sums)
-        self._add_aovs(image, self._geometric_aovs(self._plan.scene.compiled))
+            image = film_image(self.sums, metadata, keep_sums)
+        self._add_aovs(image, self.geometric_aovs())
         return image
-
-    def identity(self) -> dict[str, Any]:
-        """Return what another render must have in common with this one so that its samples are the same.
-
-        Raises
-        ------
-        SceneError
-            If a part of the scene cannot be compared.
-        """
-        plan = self._plan
-        return render_identity(
-            plan.settings,
-            plan.choice,
-            plan.scene.fingerprint(),
-            plan.scene.compiled.accelerator.name,
-            self._view,
-            plan.tracer.recorded_aovs,
-        )
-
-    def checkpoint(self, command: dict[str, Any] | None) -> Checkpoint:
-        """Return the render so far, with the command that goes on with it."""
-        loop, accumulator = self.loop, self.accumulator
-        step = loop.step if self._plan.settings.values["noise"] is not None else None
-        state = {
-            **accumulator.state(),
-            "seconds": loop.scheduler.spent,
-            "first": 0 if step is None else step.first,
-        }
-        metadata = {**self.metadata(cut_short=True), **accumulator.counts()}
-        if self._plan.settings.values["denoise"]:
-            metadata[BEFORE_DENOISING] = True
-        pixels = None if step is None else step.pixels
-        return Checkpoint(accumulator.sums, metadata, state, pixels, command)
 
     def metadata(self, cut_short: bool) -> dict[str, Any]:
         """Return the settings and results of the picture so far."""
-        plan, settings = self._plan, self._plan.settings
+        plan, settings = self.plan, self.plan.settings
         first = settings.first_sample
-        most = int(self.accumulator.film.count.max())
+        most = int(self.film.count.max())
         return {
             "lighting": plan.scene.preset,
             "ground": plan.scene.ground,
@@ -214,7 +221,7 @@ class CameraRender:
             "end": settings.end,
             "workers": plan.budget.workers,
             "executor": EXECUTORS.label(plan.executor),
-            "seconds": self.loop.scheduler.elapsed,
+            "seconds": self.scheduler.elapsed,
             "interrupted": cut_short,
             "version": VERSION,
             "numpy": np.__version__,
@@ -223,16 +230,28 @@ class CameraRender:
 
     def _brightest(self) -> dict[str, list[float]]:
         """Return what the brightest emitter sends, (3,) each; zeros where sensors need no such record."""
-        compiled, recorded = self._plan.scene.compiled, NARROW in self._plan.tracer.layers
+        compiled, recorded = self.plan.scene.compiled, NARROW in self.plan.tracer.layers
         most = brightest_emitter(compiled) if recorded else np.zeros(3)
         efficacies = compiled.light_efficacies.names or (EFFICACY,)
         lux = lux_of([max(efficacies)], [most[:, None].astype(np.float32)])[0, 0]
         return {BRIGHTEST: most.tolist(), BRIGHTEST_LUX: [float(lux)] * 3}
 
-    def _geometric_aovs(self, compiled: CompiledScene) -> dict[str, NDArray[Any]]:
-        """Return the geometric AOVs that are asked for; the first time, trace them and the boxes."""
+    # --- AOVs that no sample is needed for --------------------------------------------------------------
+
+    def geometric_aovs(self, monitor: WaveMonitor | None = None) -> dict[str, NDArray[Any]]:
+        """Return the geometric AOVs that are asked for; the first time, trace them and the boxes.
+
+        Raises
+        ------
+        Stopped
+            If a monitor ends that.
+        """
         if self._geometric is None:
-            aovs, given = self._plan.settings.values["aovs"], (compiled, self.camera, self._plan.scene.shapes)
+            compiled, aovs = self.plan.scene.compiled, self.plan.settings.values["aovs"]
+            if monitor is not None:
+                stoppable = MonitoredAccelerator(compiled.accelerator, monitor, math.inf)
+                compiled = replace(compiled, accelerator=stoppable)
+            given = compiled, self.camera, self.plan.scene.shapes
             if BOXES in aovs:
                 self._boxes = object_boxes(*given)
             names = geometric_names(aovs)
@@ -244,11 +263,88 @@ class CameraRender:
         for name, layer in geometric.items():
             image.layers[name] = layer
             if name in IDS:
-                image.names[IDS[name]] = self._plan.scene.shapes.names(IDS[name])
+                image.names[IDS[name]] = self.plan.scene.shapes.names(IDS[name])
         if self._boxes is not None:
             image.metadata[BOXES] = deepcopy(self._boxes)
+
+    # --- Going on -------------------------------------------------------------------------------------
+
+    def identity(self) -> dict[str, Any]:
+        """Return what another render must have in common with this one so that its samples are the same.
+
+        Raises
+        ------
+        SceneError
+            If a part of the scene cannot be compared.
+        """
+        plan = self.plan
+        return render_identity(
+            plan.settings,
+            plan.choice,
+            plan.scene.fingerprint(),
+            plan.scene.compiled.accelerator.name,
+            plan.scene.compiled.view(self.camera),
+            plan.tracer.recorded_aovs,
+        )
+
+    def checkpoint(self, command: dict[str, Any] | None) -> Checkpoint:
+        """Return the render so far, with the command that goes on with it."""
+        values = self.plan.settings.values
+        step = self.step if values["noise"] is not None else None
+        state = {
+            "rays": self.rays,
+            "bad": self.bad.count,
+            "first_bad": list(self.bad.first),
+            "seconds": self.scheduler.spent,
+            "first": 0 if step is None else step.first,
+        }
+        metadata = {**self.metadata(cut_short=True), **self.counts()}
+        if values["denoise"]:
+            metadata[BEFORE_DENOISING] = True
+        pixels = None if step is None else step.pixels
+        return Checkpoint(self.sums, metadata, state, pixels, command)
+
+    def _count_earlier(self, state: Mapping[str, Any]) -> None:
+        """Take over what a checkpoint counts beside its sums."""
+        self.rays, self.bad.count = state["rays"], state["bad"]
+        self.bad.first = state["first_bad"][0], state["first_bad"][1]
 
 
 def _background_label(background: Any) -> Any:
     """Return the background as metadata have it."""
     return np.ravel(background).tolist() if isinstance(background, np.ndarray) else background
+
+
+class BadSamples:
+    """Counts samples that were not finite; none is dropped in silence."""
+
+    def __init__(self) -> None:
+        self.count = 0
+        self.first = 0, 0  # pixel and sample, if there is any
+
+    def count_in(self, job: Job, result: WaveResult) -> None:
+        """Count the bad lanes of a wave, which is a job of its own, and remember the first of all."""
+        if result.bad.size and not self.count:
+            sample, pixel = divmod(int(result.bad[0]), job.pixels.size)
+            sample += job.view.first_sample + job.first_sample
+            self.first = int(job.pixels[pixel]), sample
+        self.count += result.bad.size
+
+    def report(self, image: Image, cause_of: Callable[[int, int], str]) -> None:
+        """Warn of bad samples in a picture; `cause_of` a pixel and a sample returns where the value is from.
+
+        Raises
+        ------
+        RenderError
+            If they are more than 1e-4 of all. It has the picture, where they are left out.
+        """
+        if not self.count:
+            return
+        samples = image.metadata["samples"]
+        pixel, sample = self.first
+        cause = cause_of(pixel, sample)
+        first = f"pixel {pixel}, sample {sample}" + (f", {cause}" if cause else "")
+        message = f"{self.count} of {samples} samples were not finite and were dropped; first: {first}"
+        if self.count > MAX_BAD_SAMPLES * samples:
+            raise RenderError(message, image)
+        warn_caller(message)

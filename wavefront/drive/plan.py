@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from contextlib import nullcontext
 from dataclasses import replace
+from functools import cache
 
 from ..aovs.narrow_lobes import narrow_aovs
 from ..arrays.soa import soa
@@ -13,7 +14,9 @@ from ..core.errors import SceneError
 from ..core.memory import check_memory, megabytes, resident_memory
 from ..core.plural import plural
 from ..core.progress import phase
-from ..film.aov_names import LUX
+from ..film.aov_names import LUX, aov_of
+from ..film.picture_sums import empty_sums
+from ..film.sums import bytes_per_pixel
 from ..guiding import GuideTable
 from ..integrators import INTEGRATORS
 from ..integrators.tuning import JobsRunner
@@ -22,18 +25,43 @@ from ..settings import Settings
 from ..workers.executors import ExecutorLike, needs_pickling
 from ..workers.machine import single_threaded_blas
 from ..workers.remote import can_be_sent
-from .accumulator import picture_memory
 from .choice import Choice, choose, learn_guide
 from .hints import caustics_hint
+from .jobs import SMALL_WAVE, default_wave_size
 from .prepared_scene import PreparedScene
 from .tracing import Tracer
-from .work import SMALL_WAVE, default_wave_size
 
+PICTURE_BYTES = 108  # of a pixel of the picture, and of what is needed to make it
+AOV_BYTES = 8  # of a pixel and channel of an AOV and its error
+SPARE_BYTES = 16 << 20
 LANE_BYTES = 1000  # of a lane of a wave, with its share of results that wait to be added
 PROCESS_BYTES = 70 << 20  # of a worker process beside its wave: pages it does not share, and what glibc keeps
 THREAD_BYTES = 35 << 20  # of a worker thread beside its wave: its stack, and the buffer of OpenBLAS
 GOOD_WAVE = 1 << 14  # lanes; there are fewer workers rather than smaller waves
 LEAST_WAVE = 1 << 10  # lanes; with less memory than such a wave needs there is no render
+
+
+def picture_memory(size: Sequence[int], layers: Sequence[str] = (), light_tracing: bool = False) -> int:
+    """Return how many bytes the sums of samples, and the picture of them, need.
+
+    Parameters
+    ----------
+    size
+        (width, height)
+    layers
+        The sampled AOVs, those with a key by it, such as "light_groups.sun"; of up to 127 samples.
+    light_tracing
+        Whether there are paths from lights, too.
+    """
+    sums = _bytes_of_sums(tuple(layers), light_tracing)
+    picture = PICTURE_BYTES + AOV_BYTES * sum(aov_of(name).channels for name in layers)
+    return (sums + picture) * size[0] * size[1] + SPARE_BYTES
+
+
+@cache
+def _bytes_of_sums(layers: tuple[str, ...], light_tracing: bool) -> int:
+    """Return how many bytes each pixel takes of the sums."""
+    return bytes_per_pixel(lambda pixels: empty_sums((pixels, 1), layers, light_tracing))
 
 
 @soa

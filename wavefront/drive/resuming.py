@@ -13,11 +13,10 @@ from ..camera import Camera
 from ..compile.scene import CompiledScene
 from ..core.errors import SaveError, SceneError, warn_caller
 from ..core.fingerprint import fingerprint
-from ..film.checkpoint import Checkpoint, check_identity, contents_of, other_versions, read_checkpoint
+from ..film.checkpoint import Checkpoint, check_identity, other_versions, read_checkpoint
 from ..film.identity import CODE, SCENE
 from ..film.picture_sums import PictureSums
 from ..settings import SETTINGS, Settings
-from .accumulator import Accumulator
 from .choice import Choice
 
 OTHERWISE = '; quality="reference" goes on with one of 100 samples that was begun by an earlier version'
@@ -98,8 +97,8 @@ class CheckpointFile:
         self._interval, self._last, self._warned = interval, time.perf_counter(), False
         self._samples = 0  # in the file, if this render has written it or gone on from it
 
-    def resume(self, accumulator: Accumulator, settings: Settings) -> Checkpoint | None:
-        """Put the samples of the file into the accumulator, if there is a file.
+    def resume(self, sums: PictureSums, settings: Settings) -> Checkpoint | None:
+        """Put the samples of the file into the sums of none, if there is a file.
 
         Raises
         ------
@@ -109,9 +108,9 @@ class CheckpointFile:
         if not os.path.lexists(self.path):
             return None
 
-        def sums(header: Any) -> PictureSums:
+        def checked(header: Any) -> PictureSums:
             otherwise = OTHERWISE if settings.by_itself else ""
-            check_identity(self.path, header["identity"], accumulator.sums.identity, otherwise)
+            check_identity(self.path, header["identity"], sums.identity, otherwise)
             first = header["metadata"]["sample_ranges"][0][0]
             if first != settings.first_sample:
                 raise SceneError(
@@ -120,18 +119,16 @@ class CheckpointFile:
             versions = other_versions(header)
             if versions:
                 warn_caller(f"{os.fspath(self.path)} is of {versions}: bits of the picture may differ")
-            return accumulator.sums
+            return sums
 
-        checkpoint = read_checkpoint(self.path, sums)
-        most = int(accumulator.film.count.max())
+        checkpoint = read_checkpoint(self.path, checked)
+        most = int(sums.film.count.max())
         if most > settings.max_spp:
             raise SceneError(
                 f"{os.fspath(self.path)}: has {most} samples per pixel, more than the "
                 f"{settings.max_spp} asked for"
             )
-        with contents_of(self.path):
-            accumulator.count_earlier(checkpoint.state)
-        self._samples = accumulator.samples
+        self._samples = int(sums.film.count.sum())
         return checkpoint
 
     def write_if_due(self, make: Callable[[], Checkpoint]) -> None:

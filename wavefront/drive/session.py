@@ -6,7 +6,7 @@ import os
 import shlex
 import threading
 import time
-from collections.abc import Generator, Iterator
+from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 from functools import partial
@@ -20,6 +20,7 @@ from ..core.interrupt import InterruptHandler
 from ..core.shared import STOP, SharedInt, Stopped
 from ..core.suggestions import suggests_keywords
 from ..film.checkpoint import Checkpoint
+from ..film.picture_sums import PictureSums, empty_sums
 from ..image import Image
 from ..integrators.tuning import TrialJob, TrialPart
 from ..io.to_scene import as_scene, choose_camera, coloring_of
@@ -27,7 +28,6 @@ from ..settings import RenderSettings, Settings, describes_settings, takes_setti
 from ..workers.executors import shares_scene
 from ..workers.machine import reserve_buffers
 from ..workers.pool import WorkerPool
-from .accumulator import Accumulator
 from .final_checks import (
     LONG_PATH,
     check_last_image,
@@ -38,11 +38,11 @@ from .final_checks import (
 )
 from .hints import Hints
 from .inline import AnyPool, InlineWorker
-from .picture import CameraRender
+from .picture import Picture
 from .plan import budget_of, fits_a_wave, make_plan, trained_guide, with_choice
 from .prepared_scene import PreparedScene
 from .tracing import WaveMonitor, trace_any_job
-from .work import PassSplitter, doubling, undivided
+from .work import Work, doubling, undivided
 
 
 class SoleUse:
@@ -174,10 +174,10 @@ class Session:
         of_sums = camera.size, self._plan.tracer.recorded_aovs, self._settings.values["caustics"]
         if self._plan.inline:
             self._plan = with_choice(self._plan, camera, self._run_trial)
-            self._begin_picture(camera, Accumulator(*of_sums), begin)
+            self._begin_picture(camera, empty_sums(*of_sums), begin)
             return
         with ThreadPoolExecutor(1) as aside:
-            sums = aside.submit(Accumulator, *of_sums)
+            sums = aside.submit(empty_sums, *of_sums)
             self._plan = with_choice(self._plan, camera, self._run_trial)
         self._begin_picture(camera, sums.result(), begin)
 
@@ -224,9 +224,10 @@ class Session:
             parts.append(job.trace(tracer.scene, tracer.make_sampler, tracer.table))
         return parts
 
-    def _begin_picture(self, camera: Camera, accumulator: Accumulator, begin: float) -> None:
+    def _begin_picture(self, camera: Camera, sums: PictureSums, begin: float) -> None:
         """Get ready for a picture of a view; `begin` is when it was asked for, by `time.perf_counter`."""
-        self._render = CameraRender(self._plan, camera, accumulator, begin)
+        self._picture = Picture(self._plan, camera, sums, begin)
+        self._work = Work(self._picture, self._pool, self._monitor, self._wave_done)
         self._last_snapshot = begin
         self._ended = self._warned = False
 
@@ -267,9 +268,9 @@ class Session:
                 self._ended = True
                 self._pool.cancel()
                 raise StopIteration
-            for pass_ended in self._sweeps_of(doubling):
+            for pass_ended in self._work.sweeps(doubling):
                 if pass_ended or time.perf_counter() - self._last_snapshot >= SNAPSHOT_INTERVAL:
-                    snapshot = self._render.image()
+                    snapshot = self._picture.image()
                     self._last_snapshot = time.perf_counter()
                     if not self.interrupt_handler.pressed:
                         return snapshot
@@ -307,7 +308,7 @@ class Session:
         if self._ended:
             raise RenderError("the render is over; set_camera begins another picture")
         with self.interrupt_handler, self._use:
-            for _ in () if self._stopped else self._sweeps_of(undivided):
+            for _ in () if self._stopped else self._work.sweeps(undivided):
                 pass
             image = self._end()
         if image is None:
@@ -339,7 +340,7 @@ class Session:
         begin, settings = time.perf_counter(), self._settings
         if self._closed:
             raise RenderError("the session is closed")
-        if self._render.file is not None:
+        if self._picture.file is not None:
             raise SceneError(
                 "a session with a checkpoint renders one view; begin another session for this one"
             )
@@ -352,9 +353,9 @@ class Session:
         self._scene.compiled.view(camera)  # checks its distance
         executor = settings.executor_for(camera.size)
         budget = budget_of(settings, camera.size, executor, self._plan.tracer.recorded_aovs)
-        accumulator = Accumulator(camera.size, self._plan.tracer.recorded_aovs, values["caustics"])
+        sums = empty_sums(camera.size, self._plan.tracer.recorded_aovs, values["caustics"])
         with self.interrupt_handler, self._use:
-            self._render.discard_sweeps()
+            self._work.discard()
             self._stopped = self._dropped = False  # a stop from now on is one of the new picture
             if not self._pool.closed:
                 self._pool.cancel()
@@ -370,7 +371,7 @@ class Session:
             else:
                 self._plan = replace(self._plan, budget=budget)
             self._plan = with_choice(self._plan, camera, self._run_trial)
-            self._begin_picture(camera, accumulator, begin)
+            self._begin_picture(camera, sums, begin)
 
     def stop(self) -> None:
         """End the render: the loop over the session ends with the picture so far.
@@ -407,8 +408,8 @@ class Session:
         SceneError
             If a part of the scene cannot be compared with that of the next render. The message names it.
         """
-        sums = self._render.accumulator.sums
-        sums.identity = sums.identity or self._render.identity()
+        sums = self._picture.sums
+        sums.identity = sums.identity or self._picture.identity()
         self._make_checkpoint().write(path)
 
     def identity(self) -> dict[str, Any]:
@@ -422,7 +423,7 @@ class Session:
         SceneError
             If a part of the scene, such as an attribute of a BSDF of your own, cannot be compared.
         """
-        return self._render.identity()
+        return self._picture.identity()
 
     @suggests_keywords
     def silhouettes(self, camera: Camera | None = None) -> Iterator[tuple[int, Bools]]:
@@ -435,7 +436,7 @@ class Session:
         camera
             The camera; None for that of the picture.
         """
-        return silhouettes(self._scene.compiled, self._render.camera if camera is None else camera)
+        return silhouettes(self._scene.compiled, self._picture.camera if camera is None else camera)
 
     def tell_hints(self, image: Image) -> None:
         """Write hints to stderr if the picture took over ten seconds: one line each, once in a session.
@@ -461,19 +462,15 @@ class Session:
             if not self._ended:
                 self._keep_render()
             self._closed = self._ended = True
-            self._render.discard_sweeps()
+            self._work.discard()
             self._pool.close()
 
     # --- The picture ----------------------------------------------------------------------------------
 
-    def _sweeps_of(self, split: PassSplitter) -> Generator[bool]:
-        """Return the loop that was begun, or begin it."""
-        return self._render.sweeps(self._pool, self._monitor, self._wave_done, split)
-
     def _wave_done(self) -> None:
         """Write the checkpoint when it is due, and warn once of paths that do not end."""
-        if self._render.file is not None:
-            self._render.file.write_if_due(self._make_checkpoint)
+        if self._picture.file is not None:
+            self._picture.file.write_if_due(self._make_checkpoint)
         long = self._settings.values["max_bounces"] > LONG_PATH and self._monitor.surfaces.value > LONG_PATH
         if long and not self._warned:
             self._warned = True
@@ -481,8 +478,8 @@ class Session:
 
     def _end(self) -> Image | None:
         """Return the last picture when the loop is over, or raise what ended it; None if there is none."""
-        render, settings = self._render, self._settings
-        failure = render.loop.failure
+        picture, work, settings = self._picture, self._work, self._settings
+        failure = work.failure
         self._ended = True
         if failure is not None or self._interrupted:
             self._pool.close()
@@ -490,22 +487,22 @@ class Session:
             self._pool.begin_closing()
         else:
             self._pool.cancel()
-        render.accumulator.release_reserve()
+        picture.release_reserve()
         if self._dropped and failure is None and not self._interrupted:
             return None
         not_written = self._write_checkpoint()
-        image = render.last_image(self._interrupted or self._stopped, free_sums=self._once)
+        image = picture.last_image(self._interrupted or self._stopped, free_sums=self._once)
         if not_written is not None and (failure is not None or self._interrupted):
             warn_caller(f"the checkpoint was not written: {not_written}")
         if failure is not None:
             raise render_error(failure, image) from failure
         if not self._interrupted and not self._stopped:
-            check_last_image(image, self._plan, render.loop, self._monitor.surfaces.value)
+            check_last_image(image, picture, work.time_up, self._monitor.surfaces.value)
         if self._interrupted:
             raise interrupted(image, settings.target_spp, "" if not_written else self._how_to_go_on())
         if not_written is not None:
             raise RenderError(f"the checkpoint was not written: {not_written}", image) from not_written
-        if not render.accumulator.samples:
+        if not picture.samples:
             return None
         image = image.denoise() if settings.values["denoise"] else image
         if not (self._interrupted or self._stopped) and settings.values["progress"] in (None, True):
@@ -514,15 +511,15 @@ class Session:
 
     @property
     def _interrupted(self) -> bool:
-        return self._render.loop.interrupted or self.interrupt_handler.pressed
+        return self._work.interrupted or self.interrupt_handler.pressed
 
     def _make_checkpoint(self) -> Checkpoint:
         """Return the render so far."""
-        return self._render.checkpoint(self.command)
+        return self._picture.checkpoint(self.command)
 
     def _write_checkpoint(self) -> SaveError | MemoryError | None:
         """Write the checkpoint, where one is kept; return why it cannot be written, if it cannot."""
-        return None if self._render.file is None else self._render.file.write(self._make_checkpoint)
+        return None if self._picture.file is None else self._picture.file.write(self._make_checkpoint)
 
     def _how_to_go_on(self) -> str:
         """Return what a message says of the checkpoint; "" where none is kept."""
