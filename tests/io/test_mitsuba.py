@@ -18,10 +18,10 @@ from measurements import adaptive_fields, tensor_file
 import wavefront as wf
 from wavefront.codecs.images import write_image
 from wavefront.colors.spectrum import blackbody_spectrum, spectrum_rgb
+from wavefront.io.description.placing import facing
 from wavefront.io.losses import Losses
 from wavefront.io.mitsuba import convert as _  # noqa: F401  fills the table
 from wavefront.io.mitsuba.nodes import PLUGINS, Node
-from wavefront.io.pbrt.shapes import facing
 from wavefront.io.repair import RawMesh
 from wavefront.sampling.filters import FILTERS as FILTERS_HERE
 

@@ -21,8 +21,8 @@ from ..materials import Material, OpenPBR
 from ..textures.base import BaseTexture
 from ..textures.image import Texture
 from ..textures.normal_map import NormalMap
+from .description.computed import computed
 from .losses import Losses
-from .pbrt.textures import computed
 from .sources import GRAY, LoadLimits, PathLike, SceneFiles, checked_limits, folders
 from .xml_checks import look_through
 

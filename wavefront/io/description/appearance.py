@@ -22,6 +22,7 @@ from ..repair import RawMesh, Table
 PARAMETERS = frozenset(inspect.signature(Principled).parameters)
 BASES: dict[type[Bsdf], str] = {Diffuse: "reflectance", Principled: "base_color"}
 PLAIN = frozenset(("base_color", "transmission", "ior", "roughness", "thin"))
+F0 = 0.04  # reflectance of a `Principled` of index 1.5 along the normal, which `specular_color` multiplies
 FILM = ("film_thickness", "film_ior")
 GLASS = PLAIN.union(("roughness_v", "rotation"), FILM)
 

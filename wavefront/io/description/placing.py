@@ -7,14 +7,14 @@ from typing import Any
 
 import numpy as np
 
-from ...arrays.vec import Bools, Ints
+from ...arrays.vec import Bools, Ints, cross, dot, spans
 from ...core.errors import LimitError, SceneError
 from ...materials import Material
 from ...shapes import Instance, Mesh
 from ...shapes.instance import can_place
 from ...shapes.transform import Matrix, moved, moved_tangents
 from ..losses import Losses
-from ..repair import RawMesh, build
+from ..repair import AT_ONCE, RawMesh, build
 
 MAX_ELEMENT = 1e100  # of a matrix: the squares of larger elements overflow
 MAX_COPIES = 2**14  # meshes that cannot be instances, because their matrices are singular
@@ -125,6 +125,26 @@ def moved_raw(raw: RawMesh, matrix: Matrix) -> RawMesh:
         vertices, faces, normals = moved(matrix, raw.vertices, raw.faces, raw.normals)
         tangents = moved_tangents(matrix, raw.tangents)
     return replace(raw, vertices=vertices, faces=faces, normals=normals, tangents=tangents)
+
+
+def facing(raw: RawMesh, reverse: bool) -> RawMesh:
+    """Return a mesh whose faces have their fronts where its normals are; `reverse` is ReverseOrientation.
+
+    Faces of vertices that do not exist turn anyhow; `build` leaves them out.
+    """
+    faces, normals = raw.faces, raw.normals
+    if normals is not None:
+        ahead = np.empty(len(faces), np.bool_)
+        for part in spans(len(faces), AT_ONCE):
+            corners = (raw.vertices.take(each, 0, mode="clip") for each in faces[part].T)
+            a, b, c = (np.ascontiguousarray(each.T) for each in corners)
+            mean = normals.take(faces[part], 0, mode="clip").sum(1).T
+            ahead[part] = dot(cross(b - a, c - a), mean) >= 0
+        if not ahead.all():
+            faces = np.where(ahead[:, None], faces, faces[:, ::-1])
+    if reverse:
+        faces, normals = faces[:, ::-1], None if normals is None else -normals
+    return replace(raw, faces=faces, normals=normals)
 
 
 def in_range(matrices: Matrix) -> Bools:

@@ -9,10 +9,9 @@ import base64
 import binascii
 import json
 import struct
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from contextlib import contextmanager
 from importlib.util import find_spec
-from itertools import chain
 from typing import Any
 from urllib.parse import unquote
 
@@ -21,7 +20,7 @@ from numpy.typing import NDArray
 
 from ...core.errors import LimitError, SceneError, printable
 from ...core.plural import plural
-from ...shapes.transform import Matrix
+from ..description.numbers import shown
 from ..losses import Losses, Part
 from ..sources import MAX_TRIANGLES, SceneFiles
 from .compression import MESHOPT, unpacked_view
@@ -39,9 +38,7 @@ MAX_ELEMENTS = 2**28  # in one accessor, with or without data
 MAX_NUMBERS = 2**29  # in all accessors that are read, as several meshes may share one
 NUMBER_BYTES = 20  # of memory for each number that is read, until a mesh is made of it
 MAX_COUNT = 2**53  # of bytes or elements: all JSON readers represent whole numbers up to here exactly
-LARGEST = float(np.finfo(np.float64).max)
 OF_CANDELA = 1.0  # lm/W of light that a file gives in candela, lux or cd/m²
-SHOWN = 80  # characters of a value in a message
 # errors of reading JSON of the wrong structure: a list in place of a number, text in place of a list
 MALFORMED = (TypeError, KeyError, AttributeError, IndexError, ValueError, OverflowError)
 
@@ -265,46 +262,6 @@ class Document:
         width = values.shape[1]
         values[index] = self._strided(new, count, width, values.dtype.type, f"{where}.sparse.values")
         return values
-
-
-def floats(where: str, value: Any, count: int) -> Matrix:
-    """Return `count` finite numbers of the JSON, or raise a SceneError that names them."""
-    return table([value], count, lambda row: where)[0]
-
-
-def table(rows: list[Any], width: int, where: Callable[[int], str]) -> Matrix:
-    """Return rows of finite numbers of the JSON as (n, width).
-
-    Raises
-    ------
-    SceneError
-        If a row is something else. The message names the first such row by `where`.
-    """
-    sound = set(map(type, rows)) <= {list} and set(map(len, rows)) <= {width}
-    if sound and set(map(type, chain.from_iterable(rows))) <= {int, float}:
-        try:
-            array = np.array(rows, np.float64).reshape(-1, width)
-        except OverflowError:  # a whole number beyond float64
-            array = np.full((1, 1), np.inf)
-        if np.isfinite(array).all():
-            return array
-    row = next(i for i, value in enumerate(rows) if not is_row(value, width))
-    raise SceneError(f"{where(row)} is {shown(rows[row])}; it must be {plural(width, 'finite number')}")
-
-
-def is_row(value: Any, width: int) -> bool:
-    """Return whether a value of the JSON is a list of `width` finite numbers."""
-    return (
-        isinstance(value, list)
-        and len(value) == width
-        and all(type(x) in (int, float) and -LARGEST <= x <= LARGEST for x in value)
-    )
-
-
-def shown(value: Any) -> str:
-    """Return a value of the JSON for a message, shortened if it is long."""
-    text = str(value) if isinstance(value, Exception) else repr(value)
-    return text if len(text) <= SHOWN else text[: SHOWN - 3] + "..."
 
 
 def normalized(values: NDArray[Any]) -> NDArray[Any]:

@@ -16,13 +16,14 @@ from ...core.errors import LimitError, SceneError, printable
 from ...textures.image import StoredImage, Texture
 from ...textures.normal_map import NormalMap
 from ...textures.parameter import MAX_INDEX
-from ..description.appearance import MaterialSpec, build_material
+from ..description.appearance import F0, MaterialSpec, build_material
+from ..description.numbers import SHOWN, floats, shown
 from ..sources import GRAY
 from .anisotropy import Direction, RoughnessAlong
 from .compression import DRACO, MESHOPT
-from .document import OF_CANDELA, SHOWN, Document, floats, shown
+from .document import OF_CANDELA, Document
 from .nodes import INSTANCING
-from .specular_glossiness import F0, BesideSpecular
+from .specular_glossiness import BesideSpecular
 
 WEBP = "EXT_texture_webp"
 WRAPS = {10497: "repeat", 33071: "clamp", 33648: "mirror"}

@@ -13,9 +13,10 @@ import numpy as np
 from ...arrays.vec import Ints
 from ...core.errors import SceneError
 from ...shapes.transform import IDENTITY, Matrix
+from ..description.numbers import is_row, shown, table
 from ..description.placing import MAX_ELEMENT, in_range
 from ..repair import wide
-from .document import Document, is_row, shown, table
+from .document import Document
 from .meshes import attribute
 
 TOO_LARGE = f"has an element whose size is above {MAX_ELEMENT:g}"

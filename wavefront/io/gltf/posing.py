@@ -14,10 +14,11 @@ import numpy as np
 from ...arrays.vec import Doubles, Ints
 from ...core.plural import plural
 from ...shapes.transform import Matrix
+from ..description.numbers import floats
 from ..description.placing import MAX_ELEMENT
 from ..losses import Losses
 from ..repair import RawMesh, Table
-from .document import Document, floats
+from .document import Document
 
 MORPHED = {"POSITION": "vertices", "NORMAL": "normals", "TANGENT": "tangents"}  # attributes with targets
 

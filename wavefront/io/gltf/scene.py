@@ -15,10 +15,12 @@ from ...camera import Camera
 from ...core.errors import LimitError, SceneError, exact, printable
 from ...lights import DirectionalLight, PointLight, SpotLight
 from ...shapes.transform import IDENTITY, Matrix
+from ..description.numbers import floats, shown
 from ..description.placing import Places
-from ..losses import Losses
+from ..description.punctual import punctual_light
+from ..description.views import camera_at, pose_of
 from ..repair import RawMesh
-from .document import OF_CANDELA, Document, floats, shown
+from .document import OF_CANDELA, Document
 from .meshes import Primitive, primitives
 from .nodes import INSTANCING, Node, count_placements, placements, walk
 from .posing import Skin, held, pose, read_skin, target_weights
@@ -210,26 +212,8 @@ def _camera(camera: dict[str, Any], matrix: Matrix) -> Camera:
     if kind == "orthographic":
         half_width, half_height = _positive(lens, "xmag", None), _positive(lens, "ymag", None)
         size = _size(half_width / half_height)
-        return Camera.orthographic(*_pose(matrix), height=2 * half_height, size=size)
+        return Camera.orthographic(*pose_of(matrix), height=2 * half_height, size=size)
     raise SceneError(f"type is {shown(kind)}; it must be 'perspective' or 'orthographic'")
-
-
-def camera_at(matrix: Matrix, fov: float, size: tuple[int, int]) -> Camera:
-    """Return a camera from its matrix to world space (it looks along -z, y is up), fov in degrees."""
-    origin, target, up = _pose(matrix)
-    return Camera.look_at(origin, target, up, fov=fov, size=size)
-
-
-def _pose(matrix: Matrix) -> tuple[Matrix, Matrix, Matrix]:
-    """Return the origin, target and up vector of a camera; the scale of its node has no effect."""
-    origin, backward, up = matrix[:3, 3], _near_one(matrix[:3, 2]), _near_one(matrix[:3, 1])
-    return origin, origin - backward / (np.linalg.norm(backward) or 1.0), up
-
-
-def _near_one(vector: Matrix) -> Matrix:
-    """Return a vector multiplied by a power of two, so that its size is about 1 and it can be squared."""
-    _, exponent = np.frexp(np.abs(vector).max())
-    return np.ldexp(vector, -exponent)
 
 
 def _size(aspect: float) -> tuple[int, int]:
@@ -259,40 +243,3 @@ def _add_light(document: Document, out: GltfContents, index: Any, matrix: Matrix
         else:
             found.efficacy = OF_CANDELA
             out.lights.append(found)
-
-
-def punctual_light(
-    light: dict[str, Any], matrix: Matrix, losses: Losses, place: str
-) -> DirectionalLight | PointLight | SpotLight | None:
-    """Return a light of KHR_lights_punctual by the matrix of its node to the scene; None for other types.
-
-    Numbers that are out of range are clamped, and noted.
-
-    Raises
-    ------
-    SceneError
-        If a value is malformed.
-    """
-    color = losses.within("color", floats("color", light.get("color", [1, 1, 1]), 3), 0, np.inf, place)
-    intensity = floats("intensity", [light.get("intensity", 1)], 1)[0]
-    with np.errstate(over="ignore"):
-        strength = color * losses.within("intensity", intensity, 0, np.inf, place)
-    at, forward = matrix[:3, 3], -matrix[:3, 2]
-    match light.get("type"):
-        case "point":
-            return PointLight(at, strength)
-        case "directional":
-            return DirectionalLight(forward, strength)
-        case "spot":
-            angle, blend = _cone(light.get("spot", {}), losses, place)
-            return SpotLight(at, strength, direction=forward, angle=angle, blend=blend)
-    return None
-
-
-def _cone(spot: dict[str, Any], losses: Losses, place: str) -> tuple[float, float]:
-    """Return the angle of a spot in degrees, and the part of it over which light falls off."""
-    given = [spot.get("innerConeAngle", 0), spot.get("outerConeAngle", np.pi / 4)]
-    inner, outer = floats("cone", given, 2)
-    outer = float(losses.within("outerConeAngle", outer, np.pi / 2**20, np.pi / 2, place))
-    inner = float(losses.within("innerConeAngle", inner, 0, outer, place))
-    return float(np.degrees(2 * outer)), 1 - inner / outer

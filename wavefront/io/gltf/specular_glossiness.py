@@ -15,8 +15,6 @@ from ...textures.base import BaseTexture
 from ...textures.image import Texture
 from ...textures.parameter import Color, color
 
-F0 = 0.04  # reflectance of a `Principled` of index 1.5 along the normal, which `specular_color` multiplies
-
 
 class BesideSpecular(BaseTexture):
     """diffuse · (1 − max(specular)), where the specular color is a texture.

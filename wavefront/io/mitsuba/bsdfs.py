@@ -27,7 +27,7 @@ from ...materials import Material
 from ...textures.base import BaseTexture
 from ...textures.image import Texture
 from ...textures.normal_map import BumpMap, NormalMap
-from ..pbrt.textures import computed, product
+from ..description.computed import computed, product
 from ..spectra import INDICES, METALS
 from .nodes import Job, Node, plugin, unsupported
 from .textures import as_color, bitmap, color, roughness, scalar

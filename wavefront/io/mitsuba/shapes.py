@@ -19,11 +19,11 @@ from ...shapes.smoothing import corner_angles, facet_normals, same_rows
 from ...shapes.transform import EVEN, Matrix, is_even
 from ...textures.base import BaseTexture
 from ...textures.image import Texture
+from ..description.computed import computed
 from ..description.conversion import textures_in
-from ..description.placing import moved_raw
+from ..description.placing import facing, moved_raw
+from ..description.views import frame
 from ..joining import COLUMNS, stacked
-from ..pbrt.shapes import facing
-from ..pbrt.textures import computed
 from ..repair import RawMesh, build, with_corners_apart
 from ..surfaces import as_meshes, ball
 from ..volumes import parsed_grid
@@ -33,7 +33,6 @@ from .media import interior_of
 from .nodes import PLUGINS, Job, Node, plugin, unsupported
 from .serialized import read_serialized
 from .textures import upside_down
-from .transforms import frame
 
 SIDES = 128  # of round shapes that are meshes
 ROUND = 1e-4  # relative difference of the scales along two axes that is taken for rounding

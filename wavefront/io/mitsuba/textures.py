@@ -16,11 +16,11 @@ from ...arrays.state import SurfaceInteraction
 from ...arrays.vec import Doubles, Floats, luminance
 from ...colors import srgb_to_linear
 from ...colors.spectrum import blackbody_spectrum, spectrum_rgb, uniform_emission
-from ...core.errors import SceneError, as_array, exact, finite_array, in_brief, number
+from ...core.errors import SceneError, as_array, finite_array, in_brief, number
 from ...textures.base import BaseTexture
 from ...textures.image import Texture
 from ...textures.vertex_colors import VertexColors
-from ..pbrt.textures import clipped, computed
+from ..description.computed import texture_within
 from ..spectra import pairs_of
 from ..text_lines import numbers
 from .nodes import Job, Node, plugin, unsupported
@@ -76,12 +76,7 @@ def _within(node: Node, name: str, value: Value, use: Use) -> Value:
     if not isinstance(value, BaseTexture):
         limited = node.lost.within(name, value, 0.0, most, node.label)
         return limited if np.ndim(value) else float(limited)
-    limits = value.limits()
-    if limits and (limits[0] < 0 or limits[1] > most):
-        found, end = f"{exact(limits[0])} to {exact(limits[1])}", "1" if use == "albedo" else "more"
-        node.lost.note(f"{name}, a texture,", node.label, found, f"clamped to 0 to {end}")
-        return clipped(value) if use == "albedo" else computed(np.maximum, value, 0.0)
-    return value
+    return texture_within(node.lost, name, value, most, node.label)
 
 
 def as_color(made: Any, use: Use) -> Value:

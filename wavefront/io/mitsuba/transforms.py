@@ -6,9 +6,9 @@ from collections.abc import Callable, Mapping
 
 import numpy as np
 
-from ...arrays.vec import Doubles
 from ...core.errors import SceneError
 from ...shapes.transform import Matrix, rotation, translation
+from ..description.views import looking
 from ..text_lines import numbers
 
 Attributes = Mapping[str, str]
@@ -40,34 +40,6 @@ def product(steps: list[tuple[str, Attributes, str]]) -> Matrix:
     if not np.isfinite(matrix).all():
         raise SceneError(f"{steps[-1][2]}: the transform is not finite")
     return matrix
-
-
-def looking(name: str, origin: np.ndarray, target: np.ndarray, up: np.ndarray) -> Matrix:
-    """Return the matrix of a thing at `origin` whose z axis points at `target`, and whose y axis is up."""
-    ahead = target - origin
-    size = np.linalg.norm(ahead)
-    if not size > 0:
-        raise SceneError(f"{name}: origin and target are both {origin.tolist()}")
-    ahead = ahead / size
-    if not up.any():
-        up = frame(ahead)[:, 0]
-    left = np.cross(up, ahead)
-    size = np.linalg.norm(left)
-    if not size > 1e-12 * np.linalg.norm(up):
-        raise SceneError(f"{name}: up is {up.tolist()}, the direction of the view")
-    left = left / size
-    matrix = np.eye(4)
-    matrix[:3] = np.stack([left, np.cross(ahead, left), ahead, origin], 1)
-    return matrix
-
-
-def frame(axis: Doubles) -> Doubles:
-    """Return axes (3, 3) as columns, the third along `axis`, by the rule of Mitsuba (Duff et al. 2017)."""
-    x, y, z = axis / np.linalg.norm(axis)
-    sign = np.copysign(1.0, z)
-    a = -1 / (sign + z)
-    b = x * y * a
-    return np.array([[1 + sign * x * x * a, b, x], [sign * b, sign + y * y * a, y], [-sign * x, -y, z]])
 
 
 def vector(place: str, name: str, given: Mapping[str, str], default: float) -> list[float]:

@@ -7,12 +7,12 @@ from typing import Any
 
 import numpy as np
 
-from ...arrays.elementary import arctan2, sin_cos
 from ...camera import Camera, Sensors, SurfaceSensors
 from ...camera.projection import Orthographic, Perspective, Projection
 from ...core.errors import SceneError, number
 from ...sampling.filters import BoxFilter, GaussianFilter, TentFilter
 from ...shapes import Instance, Mesh, Shape, Sphere
+from ..description.views import angle_of, half_tangent
 from ..text_lines import numbers
 from .nodes import Job, Node, plugin, unsupported
 
@@ -240,14 +240,3 @@ def _field_of_view(node: Node, aspect: float) -> float:
     if axis == "y":
         return angle_of(half_tangent(angle) * aspect)
     return angle_of(half_tangent(angle) / np.sqrt(1 + 1 / aspect**2))
-
-
-def half_tangent(degrees: float) -> float:
-    """Return the tangent of half an angle."""
-    sin, cos = sin_cos(np.float64(np.radians(degrees) / 2))
-    return float(sin / cos)
-
-
-def angle_of(tangent: float) -> float:
-    """Return the angle the tangent of whose half is given."""
-    return float(2 * np.degrees(arctan2(np.float64(tangent), np.float64(1))))

@@ -16,8 +16,8 @@ from ...lights.environment import ConstantEnvironment
 from ...lights.ies import Web, WebLight
 from ...textures.image import Texture
 from ..description.conversion import only_one
+from ..description.views import angle_of, half_tangent
 from ..losses import Losses
-from ..mitsuba.views import angle_of, half_tangent
 from .entities import Entity, Job, converts
 
 ROWS = 64  # of an environment that are looked up at once

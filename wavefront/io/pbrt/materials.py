@@ -29,9 +29,10 @@ from ...media import GridMedium, HenyeyGreenstein, Medium
 from ...textures.base import BaseTexture
 from ...textures.image import Texture
 from ...textures.normal_map import BumpMap, NormalMap
+from ..description.computed import Value, clipped, computed
 from ..description.conversion import GRAY
 from .entities import NAMED, Entity, Job, converts, unsupported
-from .textures import Value, clipped, color, computed, fourth_root, scalar, square_root
+from .textures import color, fourth_root, scalar, square_root
 
 LEAST_INDEX = 1e-6
 CELLS = 1024  # of the cosine, for integrals over directions

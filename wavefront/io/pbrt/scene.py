@@ -16,7 +16,7 @@ from ...sampling.filters import GaussianFilter
 from ...scene import Scene
 from ...shapes.transform import Matrix, rotation, translation
 from ..description.conversion import placed, shown
-from ..mitsuba.transforms import looking
+from ..description.views import looking
 from ..repair import RawMesh
 from ..sources import SceneFiles
 from . import lights, materials, textures  # noqa: F401  they fill the table

@@ -9,20 +9,21 @@ from typing import Any
 import numpy as np
 
 from ...arrays.elementary import arccos, sin_cos_turns
-from ...arrays.vec import Doubles, cross, dot, spans
+from ...arrays.vec import Doubles
 from ...core.errors import SceneError
 from ...shapes import Group, Mesh, Shape, Sphere
 from ...shapes.transform import EVEN, Matrix, is_even
 from ...textures.base import BaseTexture
+from ..description.computed import clipped, computed, product
 from ..description.conversion import placed, textures_in
-from ..description.placing import in_range, moved_raw
-from ..repair import AT_ONCE, RawMesh, build, existing
+from ..description.placing import facing, in_range, moved_raw
+from ..repair import RawMesh, build, existing
 from ..surfaces import RINGS, SIDES, over_square
 from ..trimesh.library import import_trimesh
 from .entities import Entity, Job, converts, unsupported
 from .mappings import Mapped, Mapping
 from .materials import material_of
-from .textures import clipped, computed, product, scalar
+from .textures import scalar
 
 ROUND = 1e-5  # relative difference of the scales along two axes that is taken for rounding
 POINTS, PAIRS, NORMALS = ("point3", "point"), ("point2", "float"), ("normal3", "normal")
@@ -271,26 +272,6 @@ def _area(raw: RawMesh) -> float:
     """Return the area of a mesh."""
     a, b, c = (raw.vertices[raw.faces[:, i]] for i in range(3))
     return float(np.linalg.norm(np.cross(b - a, c - a), axis=1).sum()) / 2
-
-
-def facing(raw: RawMesh, reverse: bool) -> RawMesh:
-    """Return a mesh whose faces have their fronts where its normals are; `reverse` is ReverseOrientation.
-
-    Faces of vertices that do not exist turn anyhow; `build` leaves them out.
-    """
-    faces, normals = raw.faces, raw.normals
-    if normals is not None:
-        ahead = np.empty(len(faces), np.bool_)
-        for part in spans(len(faces), AT_ONCE):
-            corners = (raw.vertices.take(each, 0, mode="clip") for each in faces[part].T)
-            a, b, c = (np.ascontiguousarray(each.T) for each in corners)
-            mean = normals.take(faces[part], 0, mode="clip").sum(1).T
-            ahead[part] = dot(cross(b - a, c - a), mean) >= 0
-        if not ahead.all():
-            faces = np.where(ahead[:, None], faces, faces[:, ::-1])
-    if reverse:
-        faces, normals = faces[:, ::-1], None if normals is None else -normals
-    return replace(raw, faces=faces, normals=normals)
 
 
 def _mappings(thing: Any) -> dict[Any, Mapping]:

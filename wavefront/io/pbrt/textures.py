@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from copy import copy
 from typing import Any
 
@@ -13,43 +12,12 @@ from ...arrays.vec import Doubles, Floats, dot, f4
 from ...core.errors import SceneError
 from ...textures.base import BaseTexture
 from ...textures.image import UV_SETS, StoredImage, Texture
+from ..description.computed import Computed, Value, computed, limits_of, product
 from .entities import Entity, Job, converts, unsupported
 from .mappings import Mapped, MappedTexture, Mapping, mapping_of
 from .noise import noise
 
-Value = Any  # a number, a color (3,) or a texture
 DOT = 0.35  # radius of dots in cells of size 1
-
-
-class Computed(BaseTexture):
-    """A function of textures and constants, such as their product."""
-
-    def __init__(self, function: Callable[..., Any], *parts: Any, limits: tuple[float, ...] = ()) -> None:
-        self.function, self._limits = function, limits
-        self.parts = tuple(
-            part if isinstance(part, BaseTexture) else np.asarray(part, f4).reshape(-1, 1)  # (1, 1) or (3, 1)
-            for part in parts
-        )
-        textures = [part for part in parts if isinstance(part, BaseTexture)]
-        self.reads = tuple(dict.fromkeys(field for each in textures for field in each.reads))
-        self.scalar = all(
-            part.scalar if isinstance(part, BaseTexture) else np.ndim(part) == 0 for part in parts
-        )
-
-    def __repr__(self) -> str:
-        """Name the function."""
-        return f"<{self.function.__name__} of textures>"
-
-    def limits(self) -> tuple[float, ...]:
-        """Return the limits, where they are known."""
-        return self._limits
-
-    def at(self, surface: SurfaceInteraction) -> Floats:
-        """Return the values of the function, (n,) or (3, n)."""
-        found = (part.at(surface) if isinstance(part, BaseTexture) else part for part in self.parts)
-        values = self.function(*(np.atleast_2d(each) for each in found))
-        values = np.broadcast_to(values, (len(values), values.shape[1])).astype(f4)
-        return values[0] if self.scalar else np.broadcast_to(values, (3, values.shape[1]))
 
 
 class Coordinate(BaseTexture, Mapped):
@@ -84,16 +52,6 @@ class Facing(BaseTexture):
         return np.minimum(np.abs(dot(surface.ng, self.direction)), f4(1))
 
 
-def product(a: Any, b: Any) -> Any:
-    """Return a·b."""
-    return a * b
-
-
-def clipped_product(a: Any, b: Any) -> Any:
-    """Return a·b in [0, 1]."""
-    return np.clip(a * b, 0, 1)
-
-
 def blend(a: Any, b: Any, amount: Any) -> Any:
     """Return a where the amount is 0, and b where it is 1."""
     return (f4(1) - amount) * a + amount * b
@@ -107,31 +65,6 @@ def square_root(alpha: Any) -> Any:
 def fourth_root(alpha: Any) -> Any:
     """Return the roughness where α is the root of the given value."""
     return square_root(square_root(alpha))
-
-
-def limits_of(value: Value) -> tuple[float, ...]:
-    """Return the least and the greatest value; () where they are not known."""
-    if isinstance(value, BaseTexture):
-        return value.limits()
-    return float(np.min(value)), float(np.max(value))
-
-
-def computed(function: Callable[..., Any], *parts: Value, rising: bool = True) -> Value:
-    """Return a function of numbers, colors and textures, that rises with all of them where `rising`."""
-    if not any(isinstance(part, BaseTexture) for part in parts):
-        return function(*parts)
-    limits = [limits_of(part) for part in parts]
-    known = rising and all(limits)
-    ends = tuple(float(function(*end)) for end in zip(*limits, strict=True)) if known else ()
-    return Computed(function, *parts, limits=ends)
-
-
-def clipped(value: Value, factor: float = 1.0) -> Value:
-    """Return a value times a factor, clamped to [0, 1]."""
-    limits = limits_of(value)
-    if factor == 1 and limits and limits[0] >= 0 and limits[1] <= 1:
-        return value
-    return computed(clipped_product, value, factor)
 
 
 def color(entity: Entity, name: str, default: Any, job: Job, use: str = "albedo") -> Value:

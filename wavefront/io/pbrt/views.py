@@ -11,7 +11,7 @@ from ...camera.projection import Orthographic, Panorama, Perspective, Projection
 from ...core.errors import SceneError, exact
 from ...sampling.filters import BoxFilter, GaussianFilter, TentFilter
 from ...shapes.transform import Matrix
-from ..mitsuba.views import angle_of, half_tangent
+from ..description.views import angle_of, half_tangent
 from .entities import Entity, Job, converts, unsupported
 
 Settings = dict[str, Any]

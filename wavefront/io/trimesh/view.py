@@ -12,7 +12,8 @@ from ...core.errors import SceneError, warn_caller
 from ...lights import DirectionalLight, PointLight, SpotLight
 from ...scene import Scene
 from ...shapes.transform import Matrix
-from ..gltf import scene as gltf
+from ..description.punctual import punctual_light
+from ..description.views import camera_at
 from ..losses import Losses
 
 SOURCE = "trimesh object"
@@ -46,7 +47,7 @@ def add_camera(scene: Scene, geometry: Any) -> None:
             warn_caller(f"{SOURCE}: its camera has no transform; it is placed to see all of the scene")
             placed = scene.framing_camera(fov=fov, size=(width, height))
         else:
-            placed = gltf.camera_at(matrix, fov, (width, height))
+            placed = camera_at(matrix, fov, (width, height))
         lens = Perspective(fov, pixel_aspect=_pixel_aspect(camera))
         scene.camera = Camera(placed.origin, placed.rotation, lens, (width, height))
     except SceneError as error:
@@ -101,7 +102,7 @@ def _light(geometry: Any, light: Any, losses: Losses) -> DirectionalLight | Poin
         outer = min(light.outerConeAngle, np.pi / 2)
         json["spot"] = {"innerConeAngle": min(light.innerConeAngle, outer), "outerConeAngle": outer}
     try:
-        found = gltf.punctual_light(json, matrix, losses, label)
+        found = punctual_light(json, matrix, losses, label)
     except SceneError as error:
         raise SceneError(f"{label}: {error}") from error
     assert found is not None

@@ -13,13 +13,13 @@ import numpy as np
 from ...arrays.elementary import sin_cos_turns
 from ...arrays.vec import FLOAT32_MAX
 from ...bsdfs import Diffuse, Principled
-from ...core.errors import LimitError, SceneError, exact
+from ...core.errors import LimitError, SceneError
 from ...materials import Material
 from ...textures import NormalMap, Texture, VertexColors
 from ...textures.base import BaseTexture
 from ...textures.image import StoredImage
-from ..gltf.specular_glossiness import F0
-from ..pbrt.textures import clipped, computed
+from ..description.appearance import F0
+from ..description.computed import texture_within
 from ..repair import RawMesh
 from ..sources import MISSING, SceneFiles
 from .layers import typed
@@ -203,12 +203,8 @@ class _Surface:
     def _within(self, name: str, value: Any, default: Any, high: float = 1.0) -> Any:
         """Return the value of an input, clamped to its range where it is outside, which is noted."""
         place = str(self.shader.GetPrim().GetPath())
-        limits = value.limits() if isinstance(value, BaseTexture) and name != "ior" else None
-        if limits and (limits[0] < 0 or limits[1] > high):
-            found, end = f"{exact(limits[0])} to {exact(limits[1])}", f"{high:g}" if high == 1 else "more"
-            part = f"inputs:{name}, a texture,"
-            self.materials.files.losses.note(part, place, found, f"clamped to 0 to {end}")
-            return clipped(value) if high == 1 else computed(np.maximum, value, 0.0)
+        if isinstance(value, BaseTexture) and name != "ior":
+            return texture_within(self.materials.files.losses, f"inputs:{name}", value, high, place)
         if not isinstance(value, float | tuple):
             return value
         low, high = (LEAST_IOR, 1 / LEAST_IOR) if name == "ior" else (0.0, high)
