@@ -11,7 +11,7 @@ from significance import render
 
 import wavefront as wf
 from wavefront.arrays.vec import f4
-from wavefront.drive.adaptive import Pass, passes
+from wavefront.drive.jobs import Pass, passes
 from wavefront.film.film import OUTLIERS, Film, batch_size
 from wavefront.film.picture_sums import PictureSums
 from wavefront.image.image import film_image

@@ -13,8 +13,17 @@ from wavefront.arrays.vec import f4
 from wavefront.drive import final_checks as outcome
 from wavefront.drive import jobs as scheduler
 from wavefront.drive import session, tracing
-from wavefront.drive.adaptive import MIN_SPP, next_stop, passes
-from wavefront.drive.jobs import SQUARE, CameraJob, Job, JobResult, Scheduler, split_jobs
+from wavefront.drive.jobs import (
+    MIN_SPP,
+    SQUARE,
+    CameraJob,
+    Job,
+    JobResult,
+    Scheduler,
+    next_stop,
+    passes,
+    split_jobs,
+)
 from wavefront.film.film import Film
 
 

@@ -5,7 +5,7 @@ import pytest
 
 import wavefront as wf
 from wavefront.cli import main
-from wavefront.drive.adaptive import QUICK_SPP
+from wavefront.drive.jobs import QUICK_SPP
 from wavefront.settings.settings import DEFAULT_SPP, LITTLE_NOISE
 
 BALL = wf.Sphere((0, 0, 0), 1)

@@ -18,7 +18,7 @@ from wavefront.drive import choice
 from wavefront.integrators.tuning import Run, Trial
 from wavefront.sampling import tiles
 from wavefront.settings import SETTINGS
-from wavefront.settings.combinations import EXCLUSIONS, MEDIA, SETTING_OF, Exclusion, table
+from wavefront.settings.checks import EXCLUSIONS, MEDIA, SETTING_OF, Exclusion, table
 
 CAMERA = wf.Camera.look_at((3, 2, 4), (0, 0, 0), fov=45, size=(8, 8))
 ANOTHER = "another integrator"

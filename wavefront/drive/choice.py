@@ -18,7 +18,7 @@ from ..integrators.tuning import BRANCHES, JobsRunner, Run, Trial
 from ..sampling.sampler import make_sampler
 from ..sampling.tiles import MEMBERS, SIDE, STRIDE
 from ..settings import AUTO, Settings
-from ..settings.combinations import left_out
+from ..settings.checks import left_out
 from ..stages.glossy_points import glossy_materials
 from ..stages.reuse import can_reuse, shared_materials, shares_all
 

@@ -29,8 +29,7 @@ from ..image.image import film_image, last_film_image
 from ..integrators.light_tracing import Splats
 from ..version import VERSION
 from ..workers.executors import EXECUTORS, waves_per_job
-from .adaptive import Pass
-from .jobs import CameraJob, Job, JobResult, Scheduler, WaveResult
+from .jobs import CameraJob, Job, JobResult, Pass, Scheduler, WaveResult
 from .plan import PICTURE_BYTES, SPARE_BYTES, Plan
 from .resuming import CheckpointFile, render_identity
 from .tracing import MonitoredAccelerator, WaveMonitor

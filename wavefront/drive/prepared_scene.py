@@ -21,7 +21,7 @@ from ..media import Medium
 from ..scene import Scene
 from ..scene.lighting import DEFAULT, choose_ground, choose_preset, lighted
 from ..settings import AUTO, Settings
-from ..settings.combinations import MEDIA, check_combinations
+from ..settings.checks import MEDIA, check_combinations
 from .resuming import scene_fingerprint
 
 

@@ -11,9 +11,8 @@ from ..core.errors import RenderError
 from ..core.interrupt import end_with_parent
 from ..core.progress import Bar
 from ..core.shared import Stopped
-from .adaptive import Pass, passes, unfinished
 from .inline import AnyPool
-from .jobs import Job, JobResult, split_jobs
+from .jobs import Job, JobResult, Pass, passes, split_jobs, unfinished
 from .picture import Picture
 from .tracing import WaveMonitor
 

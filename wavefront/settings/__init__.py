@@ -1,9 +1,8 @@
 """The settings of a render: their declaration, their checks, and which of them go together."""
 
 from .checks import AUTO, refuse, whole_number
-from .declaration import SETTINGS, RenderSettings
+from .declaration import SETTINGS, RenderSettings, describes_settings, takes_settings
 from .settings import DEFAULT_SPP, Settings
-from .signature import describes_settings, takes_settings
 
 __all__ = [
     "AUTO",

@@ -16,8 +16,7 @@ from ..integrators.tuning import BRANCHES
 from ..sampling.sampler import SAMPLERS, SamplerMaker, make_sampler
 from ..stages.reuse import SHARED_WAYS
 from ..workers.executors import ExecutorLike, choose_executor, worker_count
-from .checks import AUTO, whole_number
-from .combinations import check_combinations
+from .checks import AUTO, check_combinations, whole_number
 from .declaration import SETTINGS, AllSettings
 
 DEFAULT_SPP = 100
