@@ -306,7 +306,7 @@ def test_samples_of_waves_that_time_ends_are_discarded(calls_of) -> None:
         while True:
             monitor.check(0, job.view.deadline)
 
-    calls_of("wavefront.drive.session.trace_any_job", endless)
+    calls_of("wavefront.drive.session.trace_job", endless)
     seconds = 0.5
     image = render(lit(), None, seconds=seconds, wave_size=384)  # one sample of all pixels
     assert image.spp <= 3
@@ -324,7 +324,7 @@ def test_pixels_without_a_sample_are_told(calls_of) -> None:
         while True:
             monitor.check(123, job.view.deadline)
 
-    calls_of("wavefront.drive.session.trace_any_job", endless_after_the_first)
+    calls_of("wavefront.drive.session.trace_job", endless_after_the_first)
     message = (
         r"288 pixels of 384 have no sample and are black: when seconds=0.5 were over, .* met 123 surfaces"
     )

@@ -2,8 +2,8 @@
 
 The errors are 0.1 % at most. Printed are all means: `pytest -s -m slow tests/physics/test_equal_means.py`.
 
-So have renders with default settings, which are large enough for the trial that chooses branches and re-use
-(`drive/choice.py`): each reference scene again, of at least 192 × 192 pixels.
+So have renders with default settings, which are large enough for the tuning run that chooses branches and
+re-use (`drive/choice.py`): each reference scene again, of at least 192 × 192 pixels.
 """
 
 import sys
@@ -28,7 +28,7 @@ MAX_ERROR = 0.001
 SPP = 4096
 RUNS = 16  # pictures that share no noise, where pixels do
 SIZE = 64
-TUNED = 192  # the least side of pictures of which a trial chooses how paths go on
+TUNED = 192  # the least side of pictures of which a tuning run chooses how paths go on
 PICTURES = {
     **{name: partial(build, SIZE) for name, build in HARD_SCENES.items()},
     **{
@@ -112,14 +112,14 @@ def test_every_case(case: Case, options: dict[str, Any], close_tiles: None) -> N
     assert_mean(measured, case.expected, MAX_ERROR, sigmas=3, rounding=ROUNDING + unseen)
 
 
-# --- What the trial chooses ------------------------------------------------------------------------
+# --- What a tuning run chooses ------------------------------------------------------------------------
 
 # small pictures of a probe get no such warning
 all_one_color = pytest.mark.filterwarnings("ignore:the picture is")
 
 
 def tuned(scene: wf.Scene) -> wf.Scene:
-    """Give a scene a picture that is large enough for a trial."""
+    """Give a scene a picture that is large enough for a tuning run."""
     camera = scene.camera
     scene.camera = wf.Camera(camera.origin, camera.rotation, camera.projection, (TUNED, TUNED))
     return scene
@@ -135,19 +135,19 @@ def mean_by_default(build: Callable[[], wf.Scene], spp: int, runs: int, **option
     return Mean.of(np.array(means)), ", ".join(sorted(chosen))
 
 
-def has_trial(case: Case) -> bool:
-    """Whether the trial can choose anything for a case."""
+def is_tuned(case: Case) -> bool:
+    """Whether a tuning run can choose anything for a case."""
     return "full" in case.integrators and int(case.options.get("max_bounces", 4)) > 1  # type: ignore[call-overload]
 
 
-TUNED_CASES = [case for case in CASES if has_trial(case)]
+TUNED_CASES = [case for case in CASES if is_tuned(case)]
 
 
 @all_one_color
 @pytest.mark.slow
 @pytest.mark.parametrize("case", TUNED_CASES, ids=str)
 def test_every_case_by_default(case: Case) -> None:
-    """The probe of each scene measures its known light, whatever the trial chooses."""
+    """The probe of each scene measures its known light, whatever a tuning run chooses."""
     spp = 8
     found, chosen = mean_by_default(case.build, spp, RUNS, **{"max_bounces": 4, **case.options})
     print(f"{case}: {found} ({chosen}), must be {case.expected:.6g}")
@@ -176,12 +176,12 @@ def test_pictures_by_default(name: str) -> None:
         pytest.param("point light, offset 1.5", "branches 1", marks=pytest.mark.slow),
     ],
 )
-def test_the_trial_keeps_means(name: str, due: str, monkeypatch: pytest.MonkeyPatch) -> None:
-    trials, trial = [], choice.Trial
-    monkeypatch.setattr(choice, "Trial", lambda *a, **k: trials.append(1) or trial(*a, **k))
+def test_the_tuning_run_keeps_means(name: str, due: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    runs, run = [], choice.tuning_run
+    monkeypatch.setattr(choice, "tuning_run", lambda *a, **k: runs.append(1) or run(*a, **k))
     (case,) = (case for case in CASES if case.name == name)
     options = {"max_bounces": 4, **case.options, "workers": 1, "accel": "numpy"}
     found, chosen = mean_by_default(case.build, 1, 6, **options)
-    assert len(trials) >= 6
+    assert len(runs) >= 6
     assert chosen == due
     assert_mean(found, case.expected, 0.003)

@@ -4,18 +4,15 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator, Sequence
-from dataclasses import replace
 from itertools import combinations
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 import pytest
 from scenes import cornell_box
 
 import wavefront as wf
 from wavefront.drive import choice
-from wavefront.integrators.tuning import Run, Trial
 from wavefront.sampling import tiles
 from wavefront.settings import SETTINGS
 from wavefront.settings.checks import EXCLUSIONS, MEDIA, SETTING_OF, Exclusion, table
@@ -140,18 +137,10 @@ def test_pairs_of_the_table_are_refused(each: Exclusion) -> None:
 @pytest.mark.filterwarnings("ignore:noise=")  # of one sample is unknown
 @pytest.mark.parametrize("each", [each for each in OF_SETTINGS if each.one == "reuse"], ids=named)
 def test_auto_leaves_re_use_out(each: Exclusion, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Where something else of the table is asked for, whatever a trial would say."""
-
-    render = Trial._render
-
-    def pays(trial: Trial, reuse: bool, guided: bool) -> Run:
-        variance = np.full(16, 0.1 if reuse else 1.0)
-        run = render(trial, reuse, guided)
-        return replace(run, variance=variance, common=variance, first=0.0, onward=1.0)
-
+    """Where something else of the table is asked for, whatever a tuning run would say."""
     monkeypatch.setattr(choice, "LEAST_PIXELS", 1)
     monkeypatch.setattr(tiles, "PIXELS_PER_TRIED", 100)
-    monkeypatch.setattr(Trial, "_render", pays)
+    monkeypatch.setattr(choice, "_sharing_pays", lambda *found: True)
     image = wf.render(cornell_box((28, 28)), 1, progress=False)
     assert image.metadata["reuse"] is True
     image = wf.render(cornell_box((28, 28)), 1, progress=False, **given(each.other))

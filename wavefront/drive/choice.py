@@ -8,32 +8,31 @@ that a picture of 64 samples that gets 64 more is the one of 128.
 from __future__ import annotations
 
 from dataclasses import replace
+from functools import partial
 
 from ..arrays.soa import soa
 from ..camera import Camera
 from ..compile.scene import CompiledScene
 from ..guiding import GuideTable
 from ..integrators.training import train
-from ..integrators.tuning import BRANCHES, JobsRunner, Run, Trial
-from ..sampling.sampler import make_sampler
+from ..integrators.tuning import BRANCHES, Run, tuning_run
+from ..sampling.sampler import SamplerMaker, make_sampler
 from ..sampling.tiles import MEMBERS, SIDE, STRIDE
 from ..settings import AUTO, Settings
 from ..settings.checks import left_out
 from ..stages.glossy_points import glossy_materials
-from ..stages.reuse import can_reuse, shared_materials, shares_all
+from ..stages.reuse import can_reuse, shared_materials
 
-LEAST_PIXELS = 192 * 192  # of pictures that get a trial; smaller ones take no longer than a moment
+LEAST_PIXELS = 192 * 192  # of pictures that get a tuning run; smaller ones take no longer than a moment
 GUIDE_HINT = "most light is hard to find here: guide=True may pay (docs/guiding.md)"
-# Variance times rays must fall below this part: rays tell the cost to about a tenth, and a trial may miss the
-# few paths that find most of the light.
-GAIN = 0.85
-GAIN_OF_BRANCHES = 0.95  # likewise; costs of branches are known better, since one run tells all of them
-OUTLIERS = 0.02  # part of the pixels, the noisiest, that do not count
-OUTLIERS_OF_SHARED = 0.005  # likewise, for re-use, which may bring most where few pixels hold the noise
-GAIN_BESIDE_GLOSS = 0.6  # of re-use beside sharp lobes: they gain little, and trials miss it
+GAIN_OF_GUIDE = 0.85  # variance times rays must fall below this part: rays tell the cost to about a tenth
+GAIN_OF_BRANCHES = 0.95  # likewise; one run tells the costs of both numbers
+BRIGHT_SPOTS = 0.6  # part of the variance in few pixels from where on branches only meet more bright spots
 GUIDE_TILES = 128  # whatever the size of the picture: training takes longer anyway
-RARE_LIGHT = 1.0  # relative variance of a pixel of four samples, from where on light is hard to find
+RARE_LIGHT = 0.7  # relative variance of a pixel of four samples, from where on light is hard to find
 MOST_PATHS = 0.4  # part of the paths that must meet second points which can be shared
+OWN_LIGHT = 0.25  # part of the variance, at most, in light that is not shared; sharing takes thrice the time
+NARROW_LOBES = 0.02  # part of the paths, at most, that second points send on in narrow lobes
 
 
 @soa
@@ -44,11 +43,6 @@ class Choice:
     reuse: bool = False
     guided: bool = False
     hint: str | None = None  # what may pay besides
-
-    @property
-    def ways(self) -> int:
-        """In how many ways a path goes on for itself: branches of shared paths are not told apart."""
-        return 1 if self.reuse else self.branches
 
 
 def learn_guide(settings: Settings, scene: CompiledScene, camera: Camera) -> GuideTable | None:
@@ -67,80 +61,78 @@ def choose(
     settings: Settings,
     scene: CompiledScene,
     camera: Camera,
-    has_guide: bool,
-    run: JobsRunner,
-    workers: int = 1,
+    maker: SamplerMaker,
+    table: GuideTable | None,
 ) -> Choice:
-    """Return how the paths of a picture go on, and what else may pay; run trials where they are needed.
+    """Return how the paths of a picture go on, and what else may pay, by a tuning run where one is needed.
 
     Parameters
     ----------
     camera
         In the unit of the compiled scene.
-    has_guide
-        Whether there is something to guide them.
-    run
-        Does the jobs of trials.
-    workers
-        How many of them have something to do.
+    maker
+        Of samplers, given a seed and the width of a picture.
+    table
+        What may guide the paths.
     """
     branches, reuse = settings.values["branches"], settings.values["reuse"] is True
-    asked = Choice(1 if branches == AUTO else int(branches), reuse, has_guide)
+    asked = Choice(1 if branches == AUTO else int(branches), reuse, table is not None)
     if settings.quick and settings.is_full and branches == AUTO and not reuse:
-        return replace(asked, branches=BRANCHES[-1])
+        return replace(asked, branches=BRANCHES)
     whole = camera.cropped((0, 0, *camera.resolution))  # a window is a part of the same picture
-    seed, bounces = settings.training_seed(1), settings.values["max_bounces"]
-    if settings.is_full and has_guide and settings.values["guide"] == AUTO:
-        trial = Trial(whole, seed, bounces, run, GUIDE_TILES, workers)
-        plain, guided = (_branched(settings, trial, replace(asked, guided=each)) for each in (False, True))
-        return guided if _cost(trial, guided, plain) < GAIN else plain
+    sampler = maker(settings.training_seed(1), whole.resolution[0])
+    tune = partial(tuning_run, scene, whole, sampler, settings.values["max_bounces"])
+    if settings.is_full and table is not None and settings.values["guide"] == AUTO:
+        unguided = tune(tiles=GUIDE_TILES)
+        guided = tune(tiles=GUIDE_TILES, table=table, like=unguided)
+        return _best(settings, whole, asked, unguided, guided)
     if settings.is_full and _tries_something(settings, scene, whole):
-        return _tried(settings, scene, whole, Trial(whole, seed, bounces, run, workers=workers), asked)
+        return _chosen(settings, scene, whole, asked, tune(table=table))
     return asked
 
 
-def _tried(settings: Settings, scene: CompiledScene, camera: Camera, trial: Trial, plain: Choice) -> Choice:
-    """Return whether pixels share paths, or else how many branches these have; `plain` is neither."""
-    found = trial.run(False, plain.guided)
-    light_is_rare = found.mean_variance(OUTLIERS_OF_SHARED) > RARE_LIGHT
-    plain = replace(plain, hint=GUIDE_HINT if light_is_rare and not plain.guided else None)
-    branched = _branched(settings, trial, plain)
-    if not _may_reuse(settings, camera) or not _may_gain(scene, found, light_is_rare):
-        return branched
-    branched, shared = plain if light_is_rare else branched, replace(plain, reuse=True)
-    cost = _cost(trial, shared, branched, OUTLIERS_OF_SHARED)
-    if shares_all(scene):  # a few noisy pixels, which the trial may miss, are what sharing gains most in
-        cost -= _run(trial, shared).cost_error(_run(trial, branched), OUTLIERS_OF_SHARED, 1, branched.ways)
-    elif not light_is_rare and _cost(trial, shared, plain, OUTLIERS_OF_SHARED) >= GAIN_BESIDE_GLOSS:
-        return branched
-    return shared if cost < GAIN else branched
+def _best(settings: Settings, camera: Camera, asked: Choice, unguided: Run, guided: Run) -> Choice:
+    """Return whether paths are guided, with the branches that pay."""
+    plain = _branched(settings, camera, unguided, replace(asked, guided=False))
+    other = _branched(settings, camera, guided, asked)
+    cost = guided.cost(_ways(other), unguided, _ways(plain))
+    return other if cost < GAIN_OF_GUIDE else plain
 
 
-def _may_gain(scene: CompiledScene, found: Run, light_is_rare: bool) -> bool:
-    """Return whether the second points of a run of plain paths are such that sharing them may pay."""
-    kept = ~(shared_materials(scene) | glossy_materials(scene))
-    if not can_reuse(scene) or found.met[~kept].sum() < MOST_PATHS * found.paths:
+def _ways(choice: Choice) -> int:
+    """Return in how many ways a path goes on for itself: branches of shared paths are not told apart."""
+    return 1 if choice.reuse else choice.branches
+
+
+def _chosen(settings: Settings, scene: CompiledScene, camera: Camera, asked: Choice, found: Run) -> Choice:
+    """Return whether pixels share paths, or else how many branches these have, by what a run has found."""
+    light_is_rare = found.mean_variance() > RARE_LIGHT
+    asked = replace(asked, hint=GUIDE_HINT if light_is_rare and not asked.guided else None)
+    if _may_reuse(settings, camera) and _sharing_pays(scene, found, light_is_rare):
+        return replace(asked, reuse=True)
+    return _branched(settings, camera, found, asked)
+
+
+def _sharing_pays(scene: CompiledScene, found: Run, light_is_rare: bool) -> bool:
+    """Return whether sharing paths pays: most of them can be shared, and these make the noise.
+
+    Mirrors, glass and narrow lobes at second points make bright spots, which no pixel can share. They are
+    most of the noise unless all light is hard to find.
+    """
+    alone = ~(shared_materials(scene) | glossy_materials(scene))
+    if not can_reuse(scene) or found.met[~alone].sum() < MOST_PATHS * found.paths:
         return False
-    return light_is_rare or not kept.any()
+    if found.share_of_own() > OWN_LIGHT:
+        return False
+    return light_is_rare or (not alone.any() and found.narrow <= NARROW_LOBES * found.paths)
 
 
-def _branched(settings: Settings, trial: Trial, choice: Choice) -> Choice:
-    """Return a choice with as many branches as pay; paths from sensors have no first ray to share."""
-    if settings.values["branches"] == AUTO and not choice.reuse and trial.of_picture:
-        costs = [_cost(trial, replace(choice, branches=each), choice) for each in BRANCHES]
-        if min(costs) < GAIN_OF_BRANCHES:
-            return replace(choice, branches=BRANCHES[costs.index(min(costs))])
-    return choice
-
-
-def _cost(trial: Trial, one: Choice, other: Choice, outliers: float = OUTLIERS) -> float:
-    """Return variance times rays of a choice over that of another."""
-    return _run(trial, one).cost(_run(trial, other), outliers, one.ways, other.ways)
-
-
-def _run(trial: Trial, choice: Choice) -> Run:
-    """Return the run of a choice."""
-    return trial.run(choice.reuse, choice.guided)
+def _branched(settings: Settings, camera: Camera, found: Run, choice: Choice) -> Choice:
+    """Return a choice with branches if they pay; paths from sensors have no first ray to share."""
+    if settings.values["branches"] != AUTO or choice.reuse or camera.sensor is not None:
+        return choice
+    pays = found.cost(BRANCHES, found) < GAIN_OF_BRANCHES and found.share_of_outliers() < BRIGHT_SPOTS
+    return replace(choice, branches=BRANCHES) if pays else choice
 
 
 def _tries_something(settings: Settings, scene: CompiledScene, camera: Camera) -> bool:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from contextlib import nullcontext
+from contextvars import Context
 from dataclasses import replace
 from functools import cache
 
@@ -19,7 +20,6 @@ from ..film.picture_sums import empty_sums
 from ..film.sums import bytes_per_pixel
 from ..guiding import GuideTable
 from ..integrators import INTEGRATORS
-from ..integrators.tuning import JobsRunner
 from ..sampling.filters import FILTERS
 from ..settings import Settings
 from ..workers.executors import ExecutorLike, needs_pickling
@@ -145,13 +145,13 @@ def trained_guide(settings: Settings, scene: PreparedScene, camera: Camera) -> G
         return learn_guide(settings, scene.compiled.seen_by(camera), scene.compiled.view(camera))
 
 
-def with_choice(plan: Plan, camera: Camera, run: JobsRunner) -> Plan:
-    """Return a plan with a choice of how the paths that a camera sees go on; `run` does trials' jobs."""
-    compiled, has_guide = plan.scene.compiled, plan.tracer.table is not None
-    view, workers = compiled.view(camera), plan.budget.workers
+def with_choice(plan: Plan, camera: Camera) -> Plan:
+    """Return a plan with a choice of how the paths that a camera sees go on."""
+    tracer, view = plan.tracer, plan.scene.compiled.view(camera)
     title = nullcontext() if plan.inline else phase("trying what pays", plan.settings.values["progress"])
     with title, nullcontext() if plan.inline else single_threaded_blas:
-        choice = choose(plan.settings, compiled, view, has_guide, run, workers)
+        # in a context of its own: the caller's `np.errstate` is not that of its paths
+        choice = Context().run(choose, plan.settings, tracer.scene, view, tracer.make_sampler, tracer.table)
     hint = caustics_hint(plan.settings, plan.scene) if camera.sensor is None else None
     hint = hint or choice.hint
     return replace(plan, choice=replace(choice, hint=hint))

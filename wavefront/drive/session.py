@@ -17,15 +17,13 @@ from ..arrays.vec import Bools
 from ..camera import Camera, ImageSize, check_camera, image_size
 from ..core.errors import RenderError, SaveError, SceneError, warn_caller
 from ..core.interrupt import InterruptHandler
-from ..core.shared import STOP, SharedInt, Stopped
+from ..core.shared import STOP, SharedInt
 from ..core.suggestions import suggests_keywords
 from ..film.checkpoint import Checkpoint
 from ..film.picture_sums import PictureSums, empty_sums
 from ..image import Image
-from ..integrators.tuning import TrialJob, TrialPart
 from ..io.to_scene import as_scene, choose_camera, coloring_of
 from ..settings import RenderSettings, Settings, describes_settings, takes_settings
-from ..workers.executors import shares_scene
 from ..workers.machine import reserve_buffers
 from ..workers.pool import WorkerPool
 from .final_checks import (
@@ -41,7 +39,7 @@ from .inline import AnyPool, InlineWorker
 from .picture import Picture
 from .plan import budget_of, fits_a_wave, make_plan, trained_guide, with_choice
 from .prepared_scene import PreparedScene
-from .tracing import WaveMonitor, trace_any_job
+from .tracing import WaveMonitor, trace_job
 from .work import Work, doubling, undivided
 
 
@@ -173,20 +171,20 @@ class Session:
         """Choose how paths go on; meanwhile a thread takes the memory of large pictures."""
         of_sums = camera.size, self._plan.tracer.recorded_aovs, self._settings.values["caustics"]
         if self._plan.inline:
-            self._plan = with_choice(self._plan, camera, self._run_trial)
+            self._plan = with_choice(self._plan, camera)
             self._begin_picture(camera, empty_sums(*of_sums), begin)
             return
         with ThreadPoolExecutor(1) as aside:
             sums = aside.submit(empty_sums, *of_sums)
-            self._plan = with_choice(self._plan, camera, self._run_trial)
+            self._plan = with_choice(self._plan, camera)
         self._begin_picture(camera, sums.result(), begin)
 
     def _make_pool(self) -> None:
         """Make a pool of workers, which start with the first job if not before."""
         self._monitor = WaveMonitor()
         self.interrupt_handler.watch(self._monitor.stop)
-        work = partial(trace_any_job, self._plan.tracer)
-        self._pool: AnyPool  # of two kinds of jobs, each with its kind of results
+        work = partial(trace_job, self._plan.tracer)
+        self._pool: AnyPool
         if self._plan.inline:
             self._pool = InlineWorker(work, self._monitor)
         else:
@@ -199,30 +197,6 @@ class Session:
             )
         if self._in_block:
             self._pool.__enter__()
-
-    def _run_trial(self, jobs: list[TrialJob]) -> list[TrialPart]:
-        """Do the jobs of a trial, in their order.
-
-        Workers that share the scene do them. Where workers would have to be sent it first, where memory runs
-        out, or where the session was stopped, they are done here.
-
-        Raises
-        ------
-        KeyboardInterrupt
-            If Ctrl-C was pressed.
-        """
-        if shares_scene(self._plan.executor):
-            try:
-                return [part for _, part in self._pool.run(jobs)]
-            except (Stopped, MemoryError):
-                if not self.interrupt_handler.pressed:
-                    self._pool.discard()
-        tracer, parts = self._plan.tracer, []
-        for job in jobs:
-            if self.interrupt_handler.pressed:
-                raise KeyboardInterrupt
-            parts.append(job.trace(tracer.scene, tracer.make_sampler, tracer.table))
-        return parts
 
     def _begin_picture(self, camera: Camera, sums: PictureSums, begin: float) -> None:
         """Get ready for a picture of a view; `begin` is when it was asked for, by `time.perf_counter`."""
@@ -370,7 +344,7 @@ class Session:
                 self._make_pool()
             else:
                 self._plan = replace(self._plan, budget=budget)
-            self._plan = with_choice(self._plan, camera, self._run_trial)
+            self._plan = with_choice(self._plan, camera)
             self._begin_picture(camera, sums, begin)
 
     def stop(self) -> None:

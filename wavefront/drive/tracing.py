@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 import time
 from dataclasses import replace
 from typing import Any
@@ -22,7 +21,6 @@ from ..core.shared import SharedInt, Stopped
 from ..guiding import GuideTable
 from ..integrators import Integrator, integrator_for
 from ..integrators.light_tracing import trace_light
-from ..integrators.tuning import TrialJob, TrialPart
 from ..sampling.filters import Filter
 from ..sampling.sampler import Sampler, SamplerMaker
 from ..stages.generate import generate
@@ -85,17 +83,6 @@ class Tracer:
         return self.make_sampler(self.seed, width)
 
 
-def trace_any_job(tracer: Tracer, monitor: WaveMonitor, job: Job | TrialJob) -> JobResult | TrialPart:
-    """Trace a job of a picture, or one of a trial: the result is of the same kind.
-
-    Raises
-    ------
-    Stopped
-        If `monitor` or the deadline ends a wave between two bounces.
-    """
-    return trace_trial(tracer, monitor, job) if isinstance(job, TrialJob) else trace_job(tracer, monitor, job)
-
-
 def trace_job(tracer: Tracer, monitor: WaveMonitor, job: Job) -> JobResult:
     """Trace the waves of a job, one after the other.
 
@@ -105,18 +92,6 @@ def trace_job(tracer: Tracer, monitor: WaveMonitor, job: Job) -> JobResult:
         If `monitor` or the deadline ends a wave between two bounces.
     """
     return [_trace_wave(tracer, monitor, wave) for wave in job.waves()]
-
-
-def trace_trial(tracer: Tracer, monitor: WaveMonitor, job: TrialJob) -> TrialPart:
-    """Trace a job of a trial.
-
-    Raises
-    ------
-    Stopped
-        If `monitor` ends it between two bounces.
-    """
-    accelerator = MonitoredAccelerator(tracer.scene.accelerator, monitor, math.inf)
-    return job.trace(replace(tracer.scene, accelerator=accelerator), tracer.make_sampler, tracer.table)
 
 
 def _trace_wave(tracer: Tracer, monitor: WaveMonitor, job: Job) -> WaveResult:

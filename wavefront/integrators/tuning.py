@@ -1,12 +1,12 @@
-"""Tuning runs: an integrator on a few tiles of a picture, as choices are made by (drive/choice.py).
+"""A tuning run: plain paths in a few tiles of a picture, by which choices are made (drive/choice.py).
 
-Each run has the same pixels and the same random numbers, which are not those of the picture, so runs with
-other settings differ by what the settings do. Errors come from blocks of samples, and costs from rays that
+Its random numbers are not those of the picture. Errors come from blocks of samples, and costs from rays that
 are counted, not timed: they depend on the scene, the camera and the settings alone.
 
 One run tells what any number of branches costs. From its first surface on, each path goes on twice, with
 other random numbers. What both twins have in common is the noise of what comes before, which branches share;
-n branches have the n-th part of the rest. The same pixels and fireflies count for each number.
+n branches have the n-th part of the rest. It also tells what sharing paths (stages/reuse.py) would not touch:
+the light that paths find before they are shaded at their second points.
 
 Sources: E. Veach, thesis 1997, §10.4.2 (efficiency); M. Pharr and G. Humphreys, "Physically Based Rendering",
 1st ed. 2004, §15.1 (splitting).
@@ -14,106 +14,168 @@ Sources: E. Veach, thesis 1997, §10.4.2 (efficiency); M. Pharr and G. Humphreys
 
 from __future__ import annotations
 
-import itertools
 import math
-import statistics
-from collections.abc import Callable, Iterable
 from dataclasses import replace
-from functools import partial
-from typing import TypeAlias
 
 import numpy as np
 
 from ..accel.counter import RayCounter
 from ..aovs.path_recorder import MetSurfaces, PathRecorder
 from ..arrays.soa import soa
-from ..arrays.state import Paths, Words
+from ..arrays.state import Contribution, Paths, Words
 from ..arrays.vec import ALL, Doubles, Floats, Ints, f4
 from ..camera import Camera
 from ..compile.scene import CompiledScene
 from ..guiding import GuideTable
-from ..sampling.sampler import Sampler, SamplerMaker
+from ..sampling.sampler import Sampler
 from ..stages.generate import generate
 from ..stages.interaction import material_rows
-from .ladder import li_full
-from .registry import integrator_for
+from ..stages.shade import Shading
 from .steps import intersect_and_compact, scatter
 from .training import spread
 
-BRANCHES = (1, 2, 4)  # numbers that are tried; more gain little
+BRANCHES = 4  # of paths that branch; two gain less, more gain little
 BLOCKS, SAMPLES = 4, 4  # of each pixel: blocks of samples, which are stratified as those of a picture are
 SAMPLES_OF_SENSOR = 16  # in a block: sensors get many samples, which leave less noise of direct light
 MOST_TILES = 64  # more tell little more, and take time in large pictures
-TILES_AT_ONCE = 32  # that are traced together, at most
-LEAST_JOBS = 2  # so that two workers have something to do, if there are as many
 BOUNCES = 6  # at most: few paths get further, and a wave of few costs as much as one of many
-GROUPS = 12  # of tiles, each of which is left out in turn to tell the error of a cost
 FLOOR = 0.01  # of the squared mean of all pixels, added to that of each
+OUTLIERS = 0.02  # part of the pixels, the noisiest, that do not count
+NARROW = 1.0  # 1/sr: density of a direction that a narrow lobe has drawn; matte surfaces have 1/π at most
 # Costs relative to a ray that finds the nearest surface, which is shaded then. Few bits, for exact sums.
 SHADOW_RAY = 0.5  # of one that finds out only whether something is in its way
-SHARED_PATH = 1.5  # of evaluating BSDFs for what the other pixels of a tile have found, besides the rays
 GUIDED_RAY = 1.375  # of a ray of a guided path
 
 
-def samples_per_block(camera: Camera) -> int:
-    """Return how many samples a block of each pixel has."""
-    return SAMPLES if camera.sensor is None else SAMPLES_OF_SENSOR
-
-
 @soa
-class TrialPart:
-    """What the paths of some pixels have found."""
+class Run:
+    """What the paths of a tuning run have found."""
 
-    radiance: Doubles  # (twins, 3, BLOCKS, pixels)
+    scale: Doubles  # (3, pixels) squared mean around each pixel, which variances are relative to
+    variance: Doubles  # (pixels,) of blocks of samples
+    common: Doubles  # (pixels,) the part of it that branches share
+    own: Doubles  # (pixels,) variance of the light that pixels cannot share
     first: float  # rays up to the first surfaces, weighted by what they cost
     onward: float  # those from there on, of one twin
     met: Ints  # (materials,) how many second points of paths are of each material
+    narrow: int  # how many paths leave these in narrow lobes
+    paths: int  # from first surfaces on
 
+    def kept(self) -> Ints:
+        """Return the pixels (k,) that count: all but the noisiest."""
+        return np.argsort(self.variance, kind="stable")[: self.variance.size - self.outliers]
 
-@soa
-class TrialJob:
-    """Some tiles of a run, which are traced together."""
+    @property
+    def outliers(self) -> int:
+        """How many pixels do not count."""
+        return int(OUTLIERS * self.variance.size)
 
-    camera: Camera  # in the unit of the compiled scene
-    seed: int
-    pixels: Words  # (k,) whole tiles in turn
-    max_bounces: int
-    reuse: bool
-    guided: bool
+    def mean_variance(self, branches: int = 1) -> float:
+        """Return the mean variance of the pixels that count."""
+        of_one, common = (_mean(part[self.kept()]) for part in (self.variance, self.common))
+        common = min(max(common, 0.0), of_one)
+        return common + (of_one - common) / branches
 
-    def trace(self, scene: CompiledScene, make_sampler: SamplerMaker, table: GuideTable | None) -> TrialPart:
-        """Trace the tiles; `make_sampler` is given a seed and the width of a picture."""
-        counter, points = RayCounter(scene.accelerator), SecondPoints(scene.materials.group_of.size)
-        scene, sampler = (
-            replace(scene, accelerator=counter),
-            make_sampler(self.seed, self.camera.resolution[0]),
+    def cost(self, branches: int, than: Run, than_branches: int = 1) -> float:
+        """Return variance times rays over that of another run; 1 where that has no variance."""
+        cost, least = (
+            run.mean_variance(ways) * (run.first + ways * run.onward)
+            for run, ways in ((self, branches), (than, than_branches))
         )
-        block = samples_per_block(self.camera)
-        count = BLOCKS * block
-        sample = np.repeat(np.arange(count, dtype=np.uint32), self.pixels.size)
-        paths = generate(scene, self.camera, sampler, np.tile(self.pixels, count), sample)
-        paths.recorder = points
-        tiles, table = self.camera.tiles if self.reuse else None, table if self.guided else None
-        twins = 1 if self.reuse or self.camera.sensor is not None else 2
-        integrator = (
-            partial(li_twins, table=table) if twins == 2 else integrator_for(li_full, 1, tiles, table)
-        )
-        L = integrator(scene, paths, sampler, self.max_bounces + self.camera.scatterings)
-        finite = np.where(np.isfinite(L), L, 0).reshape(3, twins, BLOCKS, block, self.pixels.size)
-        weight = GUIDED_RAY if self.guided else 1
-        first = weight * sample.size if twins == 2 else 0.0
-        rays = (
-            weight * (counter.nearest + SHADOW_RAY * counter.shadow) + SHARED_PATH * self.reuse * sample.size
-        )
-        radiance = np.moveaxis(finite.mean(3, dtype=np.float64), 1, 0)
-        return TrialPart(radiance, first, (rays - first) / twins, points.met)
+        return cost / least if least > 0 else 1.0
 
-    def __str__(self) -> str:
-        """Name the job in an error message."""
-        return f"the trial of {self.pixels.size} pixels from {self.pixels[0]} on"
+    def share_of_outliers(self) -> float:
+        """Return the part of the variance of all pixels that those have which do not count."""
+        every = math.fsum(self.variance)
+        return 1 - math.fsum(self.variance[self.kept()]) / every if every > 0 else 0.0
+
+    def share_of_own(self) -> float:
+        """Return the part of the variance that light has which pixels cannot share; 1 where there is none."""
+        every = _mean(self.variance[self.kept()])
+        return _mean(self.own[self.kept()]) / every if every > 0 else 1.0
 
 
-JobsRunner: TypeAlias = Callable[[list[TrialJob]], Iterable[TrialPart]]  # in the order of the jobs
+def _mean(values: Doubles) -> float:
+    return math.fsum(values) / values.size
+
+
+def tuning_run(
+    scene: CompiledScene,
+    camera: Camera,
+    sampler: Sampler,
+    max_bounces: int,
+    *,
+    table: GuideTable | None = None,
+    tiles: int | None = None,
+    like: Run | None = None,
+) -> Run:
+    """Trace plain paths, or those that a table guides, in some tiles of a picture.
+
+    Parameters
+    ----------
+    camera
+        Of the whole picture, in the unit of the compiled scene.
+    sampler
+        Its numbers must not be those of the picture.
+    max_bounces
+        Of the picture.
+    tiles
+        How many of sixteen pixels, as far as the picture has them; None for as many as its size asks for.
+    like
+        A run of the same pixels, whose brightness noise is relative to; None for that of this one.
+    """
+    pixels = _tiles(camera, tiles)
+    block = SAMPLES if camera.sensor is None else SAMPLES_OF_SENSOR
+    pixel, counter = np.concatenate(pixels), RayCounter(scene.accelerator)
+    n = BLOCKS * block * pixel.size
+    sample = np.repeat(np.arange(BLOCKS * block, dtype=np.uint32), pixel.size)
+    scene = replace(scene, accelerator=counter)
+    paths = generate(scene, camera, sampler, np.tile(pixel, BLOCKS * block), sample)
+    second = paths.recorder = SecondPoints(scene.materials.group_of.size)
+    bounces = min(max_bounces, BOUNCES) + camera.scatterings
+    L = li_twins(scene, paths, sampler, bounces, table)
+    every, own = (_blocks(each, block, pixel.size) for each in (L, L if second.own is None else second.own))
+    scale = _scale(every.mean((0, 2)), pixels) if like is None else like.scale
+    deviation, of_own = (_deviation(each) for each in (every, own))
+    weight = 1 if table is None else GUIDED_RAY
+    first = weight * float(n) if camera.sensor is None else 0.0  # paths from sensors begin at one
+    return Run(
+        scale,
+        (np.square(deviation) / scale[:, None]).mean((0, 1, 2)),
+        (deviation[0] * deviation[1] / scale[:, None]).mean((0, 1)),
+        (np.square(of_own) / scale[:, None]).mean((0, 1, 2)),
+        first,
+        (weight * (counter.nearest + SHADOW_RAY * counter.shadow) - first) / 2,
+        second.met,
+        second.narrow,
+        2 * n,
+    )
+
+
+def _tiles(camera: Camera, count: int | None) -> list[Words]:
+    """Return the pixels of each of some tiles that are spread over a picture."""
+    places = camera.tiles.count
+    number = np.arange(min(count or min(camera.tiles.tried, MOST_TILES), places), dtype=np.uint64)
+    tiles = camera.tiles.pixels(spread(number, places).astype(np.intp))
+    return [pixels for pixels in tiles if pixels.size]
+
+
+def _blocks(L: Floats, block: int, pixels: int) -> Doubles:
+    """Return the means of blocks of samples of both twins, (2, 3, BLOCKS, pixels); not finite ones are 0."""
+    finite = np.where(np.isfinite(L), L, 0).reshape(3, 2, BLOCKS, block, pixels)
+    return np.moveaxis(finite.mean(3, dtype=np.float64), 1, 0)
+
+
+def _deviation(blocks: Doubles) -> Doubles:
+    """Return how blocks differ from the mean of their pixels; the mean square is the variance."""
+    return (blocks - blocks.mean(2, keepdims=True)) * math.sqrt(BLOCKS / (BLOCKS - 1))
+
+
+def _scale(mean: Doubles, tiles: list[Words]) -> Doubles:
+    """Return the squared mean (3, pixels) around each pixel of some tiles, and a part of that of all."""
+    sizes = np.array([pixels.size for pixels in tiles])
+    sums = np.add.reduceat(mean, np.cumsum(sizes) - sizes, axis=-1)
+    return np.square(sums / sizes).repeat(sizes, -1) + (FLOOR * mean.mean() ** 2 or 1.0)
 
 
 def li_twins(
@@ -142,124 +204,43 @@ def li_twins(
 
 
 class SecondPoints(PathRecorder):
-    """Counts the second points of paths by their materials, in `met`."""
-
-    def __init__(self, materials: int) -> None:
-        self.met = np.zeros(materials, np.intp)
-
-    def record_hits(self, scene: CompiledScene, met: MetSurfaces) -> None:
-        """Count those of the first bounce that go on."""
-        if met.bounce == 1:
-            self.met += np.bincount(material_rows(scene, met.kept_hits, ALL), minlength=self.met.size)
-
-
-@soa
-class Run:
-    """What a setting has brought."""
-
-    variance: Doubles  # of blocks of samples of pixels, relative to the squared mean around each
-    common: Doubles  # the part of it that branches share; all where there are no twins
-    first: float  # as of `TrialPart`
-    onward: float
-    met: Ints
-    paths: int  # from first surfaces on
-
-    def mean_variance(self, outliers: float, branches: int = 1) -> float:
-        """Return the mean variance of the pixels without this part of them, the noisiest."""
-        kept = np.argsort(self.variance, kind="stable")[
-            : self.variance.size - int(outliers * self.variance.size)
-        ]
-        of_one, common = (math.fsum(part[kept]) / kept.size for part in (self.variance, self.common))
-        common = min(max(common, 0.0), of_one)
-        return common + (of_one - common) / branches
-
-    def cost(self, than: Run, outliers: float, branches: int = 1, than_branches: int = 1) -> float:
-        """Return variance times rays over that of another run; 1 where that has no variance."""
-        cost, least = (
-            run.mean_variance(outliers, ways) * (run.first + ways * run.onward)
-            for run, ways in ((self, branches), (than, than_branches))
-        )
-        return cost / least if least > 0 else 1.0
-
-    def cost_error(self, than: Run, outliers: float, branches: int = 1, than_branches: int = 1) -> float:
-        """Return the standard error of a cost, by the jackknife (B. Efron, 1982) over groups of tiles."""
-        group = np.arange(self.variance.size) * GROUPS // self.variance.size
-        costs = []
-        for left_out in range(GROUPS):
-            kept = group != left_out
-            one, other = (
-                replace(run, variance=run.variance[kept], common=run.common[kept]) for run in (self, than)
-            )
-            costs.append(one.cost(other, outliers, branches, than_branches))
-        return math.sqrt((GROUPS - 1) * statistics.pvariance(costs))
-
-
-class Trial:
-    """The tiles of a tuning run, and the jobs that render them.
+    """Tells what is at the second points of paths.
 
     Parameters
     ----------
-    camera
-        Of the whole picture, in the unit of the compiled scene.
-    seed
-        Of random numbers that the picture does not use.
-    max_bounces
-        Of the picture.
-    run
-        Does the jobs.
-    tiles
-        How many of sixteen pixels, as far as the picture has them; None for as many as its size asks for.
-    workers
-        How many have something to do, up to two; more where there are many tiles.
+    materials
+        How many the scene has.
 
     Attributes
     ----------
-    of_picture
-        Whether it is of a picture, not of sensors.
+    met
+        How many of the points are of each material.
+    own
+        The light that was found before they are shaded, (3, slots); None where no path has one.
+    narrow
+        How many paths have left them in directions of a density above `NARROW`.
     """
 
-    def __init__(
-        self,
-        camera: Camera,
-        seed: int,
-        max_bounces: int,
-        run: JobsRunner,
-        tiles: int | None = None,
-        workers: int = 1,
+    def __init__(self, materials: int) -> None:
+        self.met = np.zeros(materials, np.intp)
+        self.own: Floats | None = None
+        self.narrow = 0
+        self._picture: Floats | None = None
+        self._shaded = True  # whether second points are, or there are none yet
+
+    def record_light(
+        self, picture: Floats, paths: Paths, contribution: Contribution, slot: Ints, arriving: Floats
     ) -> None:
-        self._camera, self._seed, self._bounces, self._do = camera, seed, min(max_bounces, BOUNCES), run
-        self._jobs, self.of_picture = min(workers, LEAST_JOBS), camera.sensor is None
-        places = camera.tiles.count
-        number = np.arange(min(tiles or min(camera.tiles.tried, MOST_TILES), places), dtype=np.uint64)
-        of_tiles = camera.tiles.pixels(spread(number, places).astype(np.intp))
-        self._tiles = [pixels for pixels in of_tiles if pixels.size]
-        self._scale: Doubles | None = None
-        self._runs: dict[tuple[bool, bool], Run] = {}
+        """Keep the picture, to which all light is added."""
+        self._picture = picture
 
-    def run(self, reuse: bool, guided: bool) -> Run:
-        """Return the run of a setting; the first one gives the brightness that noise is relative to."""
-        if (reuse, guided) not in self._runs:
-            self._runs[reuse, guided] = self._render(reuse, guided)
-        return self._runs[reuse, guided]
+    def record_hits(self, scene: CompiledScene, met: MetSurfaces) -> None:
+        """Count those of the first bounce that go on, and keep the light that was found so far."""
+        if met.bounce == 1 and self._picture is not None:
+            self.met += np.bincount(material_rows(scene, met.kept_hits, ALL), minlength=self.met.size)
+            self.own, self._shaded = self._picture.copy(), False
 
-    def _render(self, reuse: bool, guided: bool) -> Run:
-        """Render the tiles with a setting."""
-        parts = min(max(-(-len(self._tiles) // TILES_AT_ONCE), self._jobs), len(self._tiles))
-        cuts = np.linspace(0, len(self._tiles), parts + 1).astype(int)
-        jobs = [
-            TrialJob(self._camera, self._seed, pixels, self._bounces, reuse, guided)
-            for pixels in (np.concatenate(self._tiles[i:j]) for i, j in itertools.pairwise(cuts))
-        ]
-        found = list(self._do(jobs))
-        radiance = np.concatenate([part.radiance for part in found], -1)
-        mean = radiance.mean(2, keepdims=True)
-        if self._scale is None:
-            sizes = np.array([pixels.size for pixels in self._tiles])
-            sums = np.add.reduceat(mean.mean(0), np.cumsum(sizes) - sizes, axis=-1)
-            self._scale = np.square(sums / sizes).repeat(sizes, -1) + (FLOOR * mean.mean() ** 2 or 1.0)
-        deviation = (radiance - mean) * math.sqrt(BLOCKS / (BLOCKS - 1))
-        variance = (np.square(deviation) / self._scale).mean((0, 1, 2))
-        common = (deviation[0] * deviation[-1] / self._scale).mean((0, 1))
-        first, onward = sum(part.first for part in found), sum(part.onward for part in found)
-        paths = len(radiance) * variance.size * BLOCKS * samples_per_block(self._camera)
-        return Run(variance, common, first, onward, np.sum([part.met for part in found], 0), paths)
+    def record_scattering(self, paths: Paths, shade: Shading, left: Paths) -> None:
+        """Count narrow lobes at second points."""
+        if not self._shaded:
+            self.narrow, self._shaded = int(np.count_nonzero(left.specular | (left.pdf > NARROW))), True

@@ -178,7 +178,7 @@ class Settings:
     @property
     def most_branches(self) -> int:
         """The most branches that a path may have."""
-        return BRANCHES[-1] if isinstance(self.values["branches"], str) else self.values["branches"]
+        return BRANCHES if isinstance(self.values["branches"], str) else self.values["branches"]
 
     def sampler_maker(self) -> SamplerMaker:
         """Return what makes the sampler of a picture, given a seed and how many pixels wide it is."""

@@ -491,11 +491,6 @@ def can_reuse(scene: CompiledScene) -> bool:
     return not mixed and bool((shared_materials(scene) | glossy_materials(scene)).any())
 
 
-def shares_all(scene: CompiledScene) -> bool:
-    """Return whether all paths of a scene can be shared: whether all of its materials are matte."""
-    return can_reuse(scene) and bool(shared_materials(scene).all())
-
-
 def shared_materials(scene: CompiledScene) -> Bools:
     """Return which materials (materials,) can be those of shared points."""
     materials = scene.materials

@@ -225,11 +225,6 @@ def waves_per_job(executor: str | ExecutorLike) -> int:
     return WAVES_PER_TASK if isinstance(executor, DaskClient) else 1
 
 
-def shares_scene(executor: str | ExecutorLike) -> bool:
-    """Return whether workers of a name have the scene, in the memory of this process, once they start."""
-    return executor == "threads" or (executor == "processes" and _forks())
-
-
 def needs_pickling(executor: str | ExecutorLike) -> bool:
     """Return whether workers of a name can be started only with a scene that can be pickled."""
     return executor in ("spawn", "forkserver") or (executor == "processes" and not _forks())

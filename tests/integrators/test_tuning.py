@@ -2,10 +2,8 @@
 
 from __future__ import annotations
 
-import threading
 from collections.abc import Callable
 from dataclasses import replace
-from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -17,15 +15,14 @@ import wavefront as wf
 from wavefront.accel.counter import RayCounter
 from wavefront.drive import choice
 from wavefront.features.compiling import compile_scene
-from wavefront.integrators import li_full
-from wavefront.integrators import tuning as trial
-from wavefront.integrators.tuning import Run, Trial, TrialJob, TrialPart, li_twins
-from wavefront.sampling.sampler import IndependentSampler, SobolSampler
+from wavefront.integrators import li_full, tuning
+from wavefront.integrators.tuning import BLOCKS, OUTLIERS, SAMPLES, Run, li_twins, tuning_run
+from wavefront.sampling.sampler import SobolSampler
 from wavefront.sampling.tiles import pixels_of_tiles, place_in_tiles
 from wavefront.settings import Settings
 from wavefront.stages.generate import generate
 
-SIZE = (192, 192)  # the smallest pictures that get a trial
+SIZE = (192, 192)  # the smallest pictures that get a tuning run
 
 
 def many_lights(size: tuple[int, int] = (32, 32)) -> wf.Scene:
@@ -121,48 +118,19 @@ def test_paths_are_shared_beside_gloss_where_light_is_hard_to_find(gloss: wf.Bsd
     assert chosen(scene).reuse
 
 
-@pytest.mark.parametrize(
-    ("build", "by"),
-    [
-        (glossy, "light"),
-        *((build, by) for build in (room, everything, open_scene) for by in ("light", "trial")),
-    ],
-)
+@pytest.mark.parametrize("build", [glossy, room, everything, open_scene])
 def test_paths_are_not_shared_where_glass_and_gloss_make_the_noise(
-    build: Callable[[tuple[int, int]], wf.Scene], by: str, monkeypatch: pytest.MonkeyPatch
+    build: Callable[[tuple[int, int]], wf.Scene],
 ) -> None:
-    """Little light that is hard to find says so, and so would the trial."""
-    if by == "trial":
-        monkeypatch.setattr(choice, "RARE_LIGHT", 0)
-    assert not chosen(build((240, 240))).reuse
+    """Nor in the open."""
+    assert not chosen(build(SIZE)).reuse
 
 
-Setting = tuple[bool, bool]  # reuse, guided
-PLAIN, SHARED = (False, False), (True, False)
-
-
-def pretend(
-    monkeypatch: pytest.MonkeyPatch,
-    variance: dict[Setting, float],
-    others: float = 100,
-    common: float = 1,
-    onward: float = 1,
-) -> list[Setting]:
-    """Have the runs of trials find some variances, at equal costs; return what is tried.
-
-    `common` is the part of them that branches share, and `onward` that of the rays which they do not.
-    """
-    tried: list[Setting] = []
-    render = Trial._render
-
-    def found(self: Trial, *setting: Any) -> Run:
-        tried.append(setting)
-        values = np.full(32, variance.get(setting, others))
-        run = render(self, *setting)
-        return replace(run, variance=values, common=common * values, first=1 - onward, onward=onward)
-
-    monkeypatch.setattr(Trial, "_render", found)
-    return tried
+def test_a_plastic_ball_is_no_gold_ball() -> None:
+    """Most of its light goes to all sides alike."""
+    scene = glossy(SIZE)
+    scene.shapes[-1].material = wf.Material(wf.Principled((0.7, 0.5, 0.4), roughness=0.3))
+    assert chosen(scene).reuse
 
 
 def chosen(scene: wf.Scene, **settings: Any) -> choice.Choice:
@@ -171,38 +139,82 @@ def chosen(scene: wf.Scene, **settings: Any) -> choice.Choice:
     assert scene.camera is not None
     options, view = Settings(**settings), compiled.view(scene.camera)
     table = choice.learn_guide(options, compiled, view) if options.values["guide"] else None
+    return choice.choose(options, compiled, view, SobolSampler, table)
 
-    def run(jobs: list[TrialJob]) -> list[TrialPart]:
-        return [job.trace(compiled, SobolSampler, table) for job in jobs]
 
-    return choice.choose(options, compiled, view, table is not None, run)
+def pretend(
+    monkeypatch: pytest.MonkeyPatch, variance: float = 0.1, bright: float = 0.0, **found: Any
+) -> list[bool]:
+    """Have tuning runs find a variance and more; return whether each was guided.
+
+    `bright` is the part of the variance that few pixels have; parts of others are of all of it.
+    """
+    tried, run = [], tuning.tuning_run
+
+    def pretended(*args: Any, table: Any = None, **options: Any) -> Run:
+        tried.append(table is not None)
+        values, few = np.full(100, variance), int(OUTLIERS * 100)
+        values[:few] = variance + bright / (1 - bright) * values.sum() / few
+        parts = {name: found.get(name, part) * values for name, part in (("common", 0.05), ("own", 0.0))}
+        real = run(*args, **options)
+        met = np.zeros_like(real.met)
+        met[0] = found.get("met", 1.0) * 1000
+        narrow, onward = int(found.get("narrow", 0) * 1000), found.get("onward", 0.75)
+        return replace(
+            real,
+            variance=values,
+            **parts,
+            met=met,
+            narrow=narrow,
+            paths=1000,
+            first=1 - onward,
+            onward=onward,
+        )
+
+    monkeypatch.setattr(choice, "tuning_run", pretended)
+    return tried
+
+
+def with_glass(size: tuple[int, int]) -> wf.Scene:
+    """The Cornell box with a grain of glass that hardly a path meets."""
+    box = cornell_box(size)
+    return wf.Scene(
+        [*box.shapes, wf.Sphere((0, 0.9, 0), 1e-4, material=wf.Dielectric(1.5))], camera=box.camera
+    )
 
 
 @pytest.mark.parametrize(
-    ("build", "radius", "variance", "tries"),
+    ("found", "reuse"),
     [
-        (cornell_box, 0, 0.1, True),
-        (glossy, 0, 0.1, True),
-        (glossy, 0.5, 0.1, False),
-        (glossy, 0.1, 2, True),
-        (glossy, 0.5, 2, True),
+        ({}, True),
+        ({"met": 0.4}, True),
+        ({"met": 0.399}, False),
+        ({"own": 0.249}, True),
+        ({"own": 0.251}, False),
+        ({"variance": 0.71, "own": 0.251}, False),
+        ({"narrow": 0.02}, True),
+        ({"narrow": 0.021}, False),
+        ({"narrow": 0.021, "variance": 0.71}, True),
+        ({"narrow": 0.021, "variance": 0.69}, False),
+        ({"bright": 0.9}, True),
     ],
-    ids=["matte", "glossy", "glass", "seldom met, and light is rare", "often met, and light is rare"],
+    ids=str,
 )
-def test_sharing_is_tried_where_nothing_stays_alone_or_light_is_rare(
-    build: Callable[[tuple[int, int]], wf.Scene],
-    radius: float,
-    variance: float,
-    tries: bool,
-    monkeypatch: pytest.MonkeyPatch,
+def test_paths_are_shared_if_they_can_be_and_make_the_noise(
+    found: dict[str, float], reuse: bool, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """Elsewhere rare caustics may be most of the noise, and a trial may miss them."""
-    tried = pretend(monkeypatch, {PLAIN: variance, SHARED: variance / 10})
-    scene = build(SIZE)
-    if radius:
-        scene.shapes[-1] = wf.Sphere((0, -0.5, 0), radius, material=wf.Dielectric(1.5))
-    assert chosen(scene).reuse is tries
-    assert (SHARED in tried) is tries
+    """Each condition decides, from its limit on."""
+    pretend(monkeypatch, **found)
+    assert chosen(cornell_box(SIZE)).reuse is reuse
+
+
+@pytest.mark.parametrize(("variance", "reuse"), [(0.69, False), (0.71, True)])
+def test_glass_keeps_paths_alone_unless_light_is_rare(
+    variance: float, reuse: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Also glass that the tuning run does not meet: what it lights may be most of the noise."""
+    pretend(monkeypatch, variance)
+    assert chosen(with_glass(SIZE)).reuse is reuse
 
 
 @pytest.mark.parametrize(
@@ -222,108 +234,62 @@ def test_sharing_is_tried_where_nothing_stays_alone_or_light_is_rare(
 def test_paths_are_not_shared_with_some_settings(
     settings: dict[str, Any], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """Whatever a trial would say."""
-    tried = pretend(monkeypatch, {SHARED: 0.1})
+    """Whatever a tuning run would say."""
+    pretend(monkeypatch)
     for without in ({}, {"denoise": True}, {"noise": 0.1}, {"aovs": "light_groups"}):
         assert chosen(cornell_box(SIZE), **without).reuse
-    tried.clear()
     assert not chosen(cornell_box(SIZE), **settings).reuse
-    assert SHARED not in tried
 
 
 @pytest.mark.parametrize(
-    ("variance", "common", "onward", "branches"),
+    ("found", "branches"),
     [
-        (1, 1, 0.5, 1),
-        (1, 0, 0.5, 4),
-        (1, -0.1, 0.5, 4),
-        (1, 0.2, 0.5, 2),
-        (1, 0.05, 0.8, 2),
-        (1, 0.05, 0.95, 1),
-        (1, 0, 1, 1),
-        (0, 0, 0.5, 1),
+        ({"common": 0.05, "onward": 0.5}, 4),
+        ({"common": -0.1, "onward": 0.5}, 4),
+        ({"common": 0.17, "onward": 0.5}, 4),
+        ({"common": 0.18, "onward": 0.5}, 1),
+        ({"common": 0, "onward": 0.93}, 4),
+        ({"common": 0, "onward": 0.94}, 1),
+        ({"common": 1, "onward": 0.5}, 1),
+        ({"variance": 0.0}, 1),
+        ({"bright": 0.59}, 4),
+        ({"bright": 0.61}, 1),
     ],
+    ids=str,
 )
-def test_branches_must_gain_enough(
-    variance: float, common: float, onward: float, branches: int, monkeypatch: pytest.MonkeyPatch
+def test_branches_must_gain_enough_beyond_bright_spots(
+    found: dict[str, float], branches: int, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """Variance times rays decides; what gains less than counted rays tell the time is left."""
-    pretend(monkeypatch, {PLAIN: variance}, common=common, onward=onward)
+    """Variance times rays decides, by 5 %; where few pixels have most of the noise there are none."""
+    pretend(monkeypatch, **found)
     assert chosen(open_scene(SIZE), reuse=False).branches == branches
-
-
-@pytest.mark.parametrize(("shared", "reuse"), [(0.5, True), (0.6, False)])
-def test_sharing_must_be_better_than_branches(
-    shared: float, reuse: bool, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    """Where both pay the better one is taken; four branches have a cost of 0.625 here."""
-    tried = pretend(monkeypatch, {PLAIN: 0.1, SHARED: 0.1 * shared}, common=0, onward=0.5)
-    found = chosen(cornell_box(SIZE))
-    assert (found.reuse, found.branches) == (reuse, 1 if reuse else 4)
-    assert tried == [PLAIN, SHARED]
 
 
 def test_fireflies_do_not_keep_branches_away() -> None:
     """Few pixels that are noisy count alike for any number: the means of one branch may miss all of them."""
     random = np.random.default_rng(0)
-    variance = random.exponential(1, 576) + 100 * (random.random(576) < 0.05)
-    run = Run(variance, 0.01 * variance, 1.0, 1.0, np.zeros(1, np.intp), 576)
-    costs = [run.cost(run, choice.OUTLIERS, branches) for branches in (1, 2, 4)]
+    variance = random.exponential(1, 576) + 100 * (random.random(576) < 0.015)
+    run = run_of(variance, common=0.01 * variance)
+    costs = [run.cost(branches, run) for branches in (1, 2, 4)]
     assert costs == pytest.approx([1, 0.505 * 3 / 2, 0.2575 * 5 / 2])
+    assert run.share_of_outliers() > 0.5
+    assert run_of(np.ones(576)).share_of_outliers() == pytest.approx(11 / 576)
 
 
-@pytest.mark.parametrize(("build", "reuse"), [(cornell_box, True), (glossy, False)], ids=["matte", "glossy"])
-@pytest.mark.parametrize(("noisy", "may_pay"), [(6, True), (4800, False)], ids=["few pixels", "all pixels"])
-def test_sharing_is_taken_in_matte_rooms_where_few_pixels_would_decide(
-    build: Callable[[tuple[int, int]], wf.Scene],
-    reuse: bool,
-    noisy: int,
-    may_pay: bool,
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
-    """A cost of 0.95 with a large error: others of these pixels would tell something else."""
-    pretend(monkeypatch, {PLAIN: 0.1, SHARED: 0.095})
-    found = Trial._render
-
-    def noisy_in_few(self: Trial, *setting: Any) -> Run:
-        run, variance = found(self, *setting), np.zeros(4800)
-        variance[:: 4800 // noisy] = run.variance[0]
-        variance = np.roll(variance, 500 * setting[0])
-        return replace(run, variance=variance, common=variance)
-
-    monkeypatch.setattr(Trial, "_render", noisy_in_few)
-    monkeypatch.setattr(choice, "OUTLIERS_OF_SHARED", 0)
-    assert chosen(build(SIZE)).reuse is (reuse and may_pay)
-
-
-@pytest.mark.parametrize(
-    ("variance", "shared", "reuse"), [(0.1, 0.55, True), (0.1, 0.65, False), (2, 0.65, True)]
-)
-def test_sharing_beside_gloss_must_gain_more_unless_light_is_rare(
-    variance: float, shared: float, reuse: bool, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    """A short trial misses what sharp lobes find; where all light is rare they are not most of the noise."""
-    pretend(monkeypatch, {PLAIN: variance, SHARED: shared * variance})
-    assert chosen(glossy(SIZE)).reuse is reuse
-
-
-def test_sharing_is_not_tried_where_most_paths_leave(monkeypatch: pytest.MonkeyPatch) -> None:
-    """A trial of it takes longer than one of branches."""
-    tried = pretend(monkeypatch, {PLAIN: 2, SHARED: 0.1})
-    assert not chosen(open_scene(SIZE)).reuse
-    assert SHARED not in tried
+def run_of(variance: Any, **parts: Any) -> Run:
+    """Return a run that has found a variance (n,)."""
+    some = {"common": variance, "own": variance, "first": 1.0, "onward": 1.0, **parts}
+    return Run(scale=np.ones((3, 1)), variance=variance, met=np.zeros(1, np.intp), narrow=0, paths=1, **some)
 
 
 def test_a_guide_goes_with_what_pays(monkeypatch: pytest.MonkeyPatch) -> None:
-    """The trial is of guided paths then; without a guide there is a hint where light is hard to find."""
-    tried = pretend(monkeypatch, {(True, each): 0.1 for each in (False, True)})
+    """The run is of guided paths then; without a guide there is a hint where light is hard to find."""
+    tried = pretend(monkeypatch, 2.0)
     monkeypatch.setattr(choice, "train", lambda *args: object())
-    monkeypatch.setattr(trial, "integrator_for", lambda integrator, *setting: integrator)
-    monkeypatch.setattr(trial, "li_twins", lambda *wave, table: li_twins(*wave))
     guided, plain = (chosen(cornell_box(SIZE), guide=guide) for guide in (True, False))
     assert (guided.reuse, guided.guided, guided.hint) == (True, True, None)
     assert (plain.reuse, plain.guided, plain.hint) == (True, False, choice.GUIDE_HINT)
-    assert [guided for _, guided in tried] == [True, True, False, False]
+    assert tried == [True, False]
 
 
 @pytest.mark.parametrize(("dim", "hint"), [(False, None), (True, choice.GUIDE_HINT)])
@@ -351,50 +317,13 @@ def test_metadata_hint_at_a_guide(dim: bool, hint: str | None) -> None:
     ],
     ids=["small", "direct light", "naive", "branches", "reuse", "dark", "mirror"],
 )
-def test_there_is_no_trial_where_it_can_bring_nothing(
+def test_there_is_no_tuning_run_where_it_can_bring_nothing(
     scene: wf.Scene, settings: dict[str, Any], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Small pictures, direct light, other integrators, no light, no rough surface."""
-    monkeypatch.setattr(Trial, "run", None)
+    monkeypatch.setattr(choice, "tuning_run", lambda *run, **options: pytest.fail("a tuning run"))
     found = chosen(scene, **settings)
     assert (found.branches, found.reuse) == (settings.get("branches", 1), settings.get("reuse", False))
-
-
-def test_workers_of_this_machine_do_the_trial(monkeypatch: pytest.MonkeyPatch) -> None:
-    """At least two of them have something to do."""
-    threads, both_have_one = set(), threading.Barrier(2)
-    trace = TrialJob.trace
-
-    def noted(self: TrialJob, *args: Any) -> TrialPart:
-        if threading.current_thread().name not in threads:
-            threads.add(threading.current_thread().name)
-            both_have_one.wait(60)
-        return trace(self, *args)
-
-    monkeypatch.setattr(TrialJob, "trace", noted)
-    assert wf.render(cornell_box(SIZE), 1, workers=2, executor="threads").metadata["reuse"]
-    assert len(threads) == 2
-    assert threading.current_thread().name not in threads
-
-
-def test_a_session_may_be_stopped_during_the_trial_of_a_view() -> None:
-    """By another thread: the view has a choice and no picture, and the next one has its picture."""
-    scene = cornell_box(SIZE)
-    with wf.Session(scene, 1, workers=2, executor="threads", progress=False) as session:
-        run = session._pool.run
-
-        def stopped(*args: Any) -> Any:
-            session.drop()
-            return run(*args)
-
-        session._pool.run = stopped
-        session.set_camera(scene.camera)
-        assert session._plan.choice.reuse
-        session._pool.run = run
-        assert next(session, None) is None
-        session.set_camera(scene.camera)
-        image = session.run()
-    assert np.array_equal(image.rgb, render(scene, 1).rgb)
 
 
 def test_a_window_is_a_part_of_the_same_picture() -> None:
@@ -426,34 +355,8 @@ def test_decisions_do_not_depend_on_workers_waves_samples_or_time() -> None:
     assert np.array_equal(wf.Image.merge(*parts).rgb, whole.rgb)
 
 
-@pytest.mark.parametrize("accel", ["numpy", "embree"])
-def test_trials_do_not_depend_on_how_they_are_cut_into_waves(
-    accel: str, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    """Means and counts are the same for any number of tiles that are traced together."""
-    if accel == "embree":
-        pytest.importorskip("embreex")
-    scene = cornell_box(SIZE)
-    compiled = compile_scene(scene, scene.accelerators.maker(accel), mis=True)
-    found = []
-    for tiles in (1, 3, 64):
-        monkeypatch.setattr(trial, "TILES_AT_ONCE", tiles)
-        run = partial(map, lambda job: job.trace(compiled, IndependentSampler, None))
-        trials = Trial(compiled.view(scene.camera), 1, 5, run, tiles=7)
-        found.append([trials.run(*setting) for setting in (PLAIN, SHARED)])
-    for others in found[1:]:
-        for one, other in zip(found[0], others, strict=True):
-            assert (one.first, one.onward, one.met.tolist()) == (
-                other.first,
-                other.onward,
-                other.met.tolist(),
-            )
-            assert np.array_equal(one.variance, other.variance)
-            assert np.array_equal(one.common, other.common)
-
-
-def test_tiles_of_a_trial_are_those_of_the_picture() -> None:
-    """Each of them, once; so pixels share in the trial as they do in the picture."""
+def test_tiles_of_a_tuning_run_are_those_of_the_picture() -> None:
+    """Each of them, once; so pixels share brightness as they share paths in the picture."""
     x, y = pixels_of_tiles(np.arange(3 * 2 * 49), 3)
     tile, member = place_in_tiles((y * 100 + x).ravel().astype(np.uint32), 100)
     assert np.unique(y * 100 + x).size == 3 * 2 * 28 * 28
@@ -463,29 +366,29 @@ def test_tiles_of_a_trial_are_those_of_the_picture() -> None:
     assert (member.reshape(x.shape) == np.arange(16)).all()
 
 
-def test_the_variance_is_that_between_blocks() -> None:
+def test_the_variance_is_that_between_blocks(monkeypatch: pytest.MonkeyPatch) -> None:
     """Relative to the squared mean, but for the noisiest pixels; what twins share is their covariance."""
-    random, values = np.random.default_rng(0), np.array([0.1, 0.2])
+    random = np.random.default_rng(0)
 
-    def noise(jobs: list[TrialJob]) -> list[TrialPart]:
-        found = []
-        for job in jobs:
-            shape = (1 if job.reuse else 2, 3, trial.BLOCKS, job.pixels.size)
-            both = random.normal(size=shape[1:]) * 0.6 + random.normal(size=shape) * 0.8
-            found.append(3 + both * values[int(job.reuse)])
-        found[0][:, :, 0, 0] += 1000
-        return [TrialPart(each, 2.0, 6.0, np.zeros(1, np.intp)) for each in found]
+    def noise(scene: Any, paths: Any, *args: Any) -> Any:
+        n = len(paths)
+        both = random.normal(size=(3, n)) * 0.6
+        found = 3 + 0.1 * np.concatenate([both + random.normal(size=(3, n)) * 0.8 for _ in range(2)], 1)
+        found[:, 0] += 1000
+        return found.astype(np.float32)
 
-    trials = Trial(cornell_box((392, 392)).camera, 1, 5, noise)
-    runs = [trials.run(*setting) for setting in (PLAIN, SHARED)]
-    scale = 9 + trial.FLOOR * 9
-    for run, deviation in zip(runs, values, strict=True):
-        assert run.mean_variance(0.01) == pytest.approx(deviation**2 / scale, rel=0.1)
-        assert run.mean_variance(0) > 0.3
-    four = 0.36 + 0.64 / 4
-    assert runs[0].mean_variance(0.01, 4) == pytest.approx(four * values[0] ** 2 / scale, rel=0.1)
-    assert runs[1].cost(runs[0], 0.01) == pytest.approx(4, rel=0.1)
-    assert runs[0].cost(runs[0], 0.01, 4, 1) == pytest.approx(four * (2 + 4 * 6) / 8, rel=0.1)
+    monkeypatch.setattr(tuning, "li_twins", noise)
+    scene = cornell_box((392, 392))
+    compiled = compile_scene(scene, scene.accelerators.maker("numpy"), mis=True)
+    run = tuning_run(compiled, compiled.view(scene.camera), SobolSampler(1, 392), 5)
+    assert run.variance.size == 16 * tuning.MOST_TILES
+    due = 0.01 / SAMPLES / (9 + tuning.FLOOR * 9)
+    assert run.mean_variance() == pytest.approx(due, rel=0.1)
+    assert run.variance.max() > 0.3
+    assert run.mean_variance(4) == pytest.approx((0.36 + 0.64 / 4) * due, rel=0.1)
+    other = replace(run, variance=4 * run.variance)
+    assert other.cost(1, run) == pytest.approx(4)
+    assert run.share_of_own() == 1  # no path has a second point
 
 
 def within_glass() -> wf.Scene:
@@ -521,36 +424,35 @@ def test_twins_share_first_surfaces_alone(scene: wf.Scene) -> None:
     assert np.array_equal(*np.split(emitted, 2, 1))
 
 
-def test_costs_are_the_rays_of_one_path() -> None:
-    """Of both twins together, so each has half of those after their first surface."""
-    scene = cornell_box((28, 28))
+def test_a_run_tells_what_second_points_are() -> None:
+    """Of both twins together; costs are the rays of one path."""
+    scene = glossy((28, 28))
     assert scene.camera is not None
     compiled = compile_scene(scene, scene.accelerators.maker("numpy"), mis=True)
-    camera, counter = compiled.view(scene.camera), RayCounter(compiled.accelerator)
-    pixels = np.arange(28 * 28, dtype=np.uint32)
-    part = TrialJob(camera, 1, pixels, 5, False, False).trace(compiled, SobolSampler, None)
-    sample, sampler = np.repeat(np.arange(16, dtype=np.uint32), pixels.size), SobolSampler(1, 28)
-    counted = replace(compiled, accelerator=counter)
-    li_full(counted, generate(counted, camera, sampler, np.tile(pixels, 16), sample), sampler, 5)
-    rays = counter.nearest + trial.SHADOW_RAY * counter.shadow
-    assert part.first == sample.size
-    assert part.first + part.onward == pytest.approx(rays, rel=0.02)
-
-
-def test_the_error_of_a_cost() -> None:
-    """That of a quotient of means, as over many runs."""
-    random = np.random.default_rng(0)
-
-    def run(mean: float) -> Run:
-        variance = random.exponential(mean, 576)
-        return Run(variance, variance, 0.0, 2.0, np.zeros(1, np.intp), 1)
-
-    pairs = [(run(2), run(1)) for _ in range(300)]
-    costs, errors = ([getattr(a, name)(b, 0) for a, b in pairs] for name in ("cost", "cost_error"))
-    assert np.std(costs) == pytest.approx(2 * (2 / 576) ** 0.5, rel=0.15)
-    assert np.sqrt(np.mean(np.square(errors))) == pytest.approx(np.std(costs), rel=0.15)
-    nothing = replace(pairs[0][1], variance=np.zeros(576), common=np.zeros(576))
-    assert pairs[0][0].cost_error(nothing, 0) == 0
+    camera, sampler = compiled.view(scene.camera), SobolSampler(1, 28)
+    run = tuning_run(compiled, camera, sampler, 3, tiles=49)
+    counter, n = RayCounter(compiled.accelerator), 28 * 28 * BLOCKS * SAMPLES
+    sample = np.repeat(np.arange(BLOCKS * SAMPLES, dtype=np.uint32), 28 * 28)
+    pixel = np.tile(np.arange(28 * 28, dtype=np.uint32), BLOCKS * SAMPLES)
+    li_full(
+        replace(compiled, accelerator=counter),
+        generate(compiled, camera, sampler, pixel, sample),
+        sampler,
+        3,
+    )
+    assert (run.first, run.paths) == (n, 2 * n)
+    assert run.first + run.onward == pytest.approx(
+        counter.nearest + tuning.SHADOW_RAY * counter.shadow, rel=0.02
+    )
+    gold = compiled.materials.group_of == [type(b).__name__ for b in compiled.materials.groups].index(
+        "Conductor"
+    )
+    assert 0.6 < run.met.sum() / run.paths < 0.8
+    assert 0.7 * run.met[gold].sum() < run.narrow <= run.met[gold].sum()
+    direct = tuning_run(compiled, camera, sampler, 1, tiles=49, like=run)
+    assert np.array_equal(direct.variance, run.own)
+    assert 0 < run.share_of_own() < choice.OWN_LIGHT
+    assert np.array_equal(direct.scale, run.scale)
 
 
 @pytest.mark.slow
@@ -575,7 +477,7 @@ def test_renders_go_on_with_the_same_decision(tmp_path: Path) -> None:
     assert np.array_equal(render(cornell_box(SIZE), 2, reuse=True, checkpoint=path).rgb, image.rgb)
 
 
-def test_each_camera_has_a_trial_of_its_own() -> None:
+def test_each_camera_has_a_tuning_run_of_its_own() -> None:
     """A session decides anew; its workers go on, as jobs say how their paths do."""
     box = wf.Scene(cornell_box(SIZE).shapes, wf.Environment(0.01), cornell_box(SIZE).camera)
     away_from_it = wf.Camera.look_at((0, 0, 30), (0, 0, 300), fov=40, size=SIZE)
