@@ -8,7 +8,7 @@ from contextvars import Context, copy_context
 from typing import Any, Self, TypeAlias
 
 from ..core.shared import STOP, Stopped
-from ..workers.contract import WarningsOfJobs, with_warnings
+from ..workers.executors import WarningsOfJobs, with_warnings
 from ..workers.pool import POLL_INTERVAL, WorkerPool
 from .tracing import WaveMonitor
 

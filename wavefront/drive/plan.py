@@ -24,7 +24,6 @@ from ..sampling.filters import FILTERS
 from ..settings import Settings
 from ..workers.executors import ExecutorLike, needs_pickling
 from ..workers.machine import single_threaded_blas
-from ..workers.remote import can_be_sent
 from .choice import Choice, choose, learn_guide
 from .hints import caustics_hint
 from .jobs import SMALL_WAVE, default_wave_size
@@ -171,8 +170,10 @@ def make_plan(settings: Settings, scene: PreparedScene, camera: Camera, table: G
         settings.values["clamp"],
     )
     executor = settings.executor_for(camera.size)
-    if settings.values["executor"] is None and needs_pickling(executor) and not can_be_sent(tracer):
-        executor = "threads"
+    if settings.values["executor"] is None and needs_pickling(executor):
+        from ..workers.remote import can_be_sent  # here, as forked workers do without
+
+        executor = executor if can_be_sent(tracer) else "threads"
     budget = budget_of(settings, camera.size, executor, tracer.recorded_aovs)
     return Plan(settings, scene, tracer, executor, budget, fits_a_wave(settings, camera.size, budget))
 

@@ -2,17 +2,20 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from copy import copy
-from dataclasses import replace
+from dataclasses import fields, replace
 from typing import Any
 
 import numpy as np
 
-from ..accel import Accelerator, Geometry, most_copies
+from ..accel import Accelerator, Geometry, InstanceAccelerator, most_copies
 from ..aovs.geometric import ShapeTable
 from ..arrays.vec import luminance
 from ..camera import Camera
+from ..compile.scene import CompiledScene
 from ..core.errors import collect_warnings, warn_caller
+from ..core.fingerprint import fingerprint
 from ..core.progress import phase
 from ..features.compiling import compile_scene
 from ..integrators import INTEGRATORS, WITH_MIS
@@ -22,7 +25,6 @@ from ..scene import Scene
 from ..scene.lighting import DEFAULT, choose_ground, choose_preset, lighted
 from ..settings import AUTO, Settings
 from ..settings.checks import MEDIA, check_combinations
-from .resuming import scene_fingerprint
 
 
 class PreparedScene:
@@ -103,6 +105,25 @@ class PreparedScene:
         if self._fingerprint is None:
             self._fingerprint = scene_fingerprint(self.compiled, self._geometries)
         return self._fingerprint
+
+
+def scene_fingerprint(compiled: CompiledScene, geometries: Sequence[Geometry]) -> str:
+    """Return the fingerprint of a compiled scene and of what its accelerators were built from.
+
+    Raises
+    ------
+    SceneError
+        If a part of it, such as an attribute of a user's BSDF, cannot be compared.
+    """
+    parts = {each.name: getattr(compiled, each.name) for each in fields(compiled)}
+    accelerator, program = parts.pop("accelerator"), parts.pop("program")
+    parts["features"] = [each for each in program.features if each.compared]
+    del parts["specular_surfaces"]  # they follow from the rest, and the setting is compared by itself
+    if compiled.media is not None:
+        parts["media"] = replace(compiled.media, touching=None)  # likewise
+    del parts["roulette_after"]  # a setting, which is compared by itself
+    placements = accelerator.placements if isinstance(accelerator, InstanceAccelerator) else None
+    return fingerprint("the scene", {**parts, "geometries": list(geometries), "placements": placements})
 
 
 def _warn_of_light_in_endless_fog(scene: Scene) -> None:

@@ -1,4 +1,4 @@
-"""How many workers there are, and what they are: the table of executors.
+"""Executors: the contract of workers, the table of who has them, and which of these suit a render.
 
 NumPy lets go of Python's global lock inside its loops, but between two of them every thread must take
 it again, and waiting for it costs more than the loops win: two threads trace 1.4 times as fast as one,
@@ -9,34 +9,28 @@ are spawned, and take about a second until they have imported NumPy and this pac
 
 from __future__ import annotations
 
+import math
 import multiprocessing
 import os
+import platform
 import sys
 import threading
 import time
-from collections.abc import Iterable
-from concurrent.futures import Executor, ThreadPoolExecutor
+from collections.abc import Callable, Collection, Iterable, Mapping
+from concurrent.futures import BrokenExecutor, Executor, Future, ProcessPoolExecutor, ThreadPoolExecutor
+from concurrent.futures import wait as wait_for_futures
 from contextlib import suppress
 from functools import partial
 from pathlib import Path
-from typing import Any, TypeAlias
+from typing import Any, Protocol, TypeAlias, runtime_checkable
 
-from ..core.errors import SceneError, warn_caller
+from ..core.errors import SceneError, collect_warnings, warn_caller
 from ..core.registry import Registry
-from .contract import (
-    ExecutorMaker,
-    ExecutorTasks,
-    LocalWorkers,
-    StoppableWork,
-    TaskPool,
-    Workers,
-    WorkersMaker,
-    shares_memory,
-)
-from .dask import DaskClient, dask_workers, threads_in
+from ..core.shared import AT_ONCE, SharedInt, Stopped
 from .machine import reserve_buffers
-from .remote import RemoteWorkers
 
+POLL_INTERVAL = 0.02  # seconds between two checks whether workers have ended
+END_TIMEOUT = 1.0  # seconds that jobs in the user's own executor have to end
 MIN_PATHS = 1 << 18  # fewer are traced sooner than processes are forked
 MIN_PATHS_TO_SPAWN = 1 << 22  # fewer are traced sooner than processes are spawned
 
@@ -49,7 +43,201 @@ WAVES_PER_TASK = 4  # of a cluster, where a task costs 8 ms beside its work, and
 
 PROCESSES = ("processes", "spawn", "forkserver")  # names of executors whose workers are our own processes
 
+
+class JobFailed(Exception):
+    """A worker has no result for a job; another one may have."""
+
+
+class Workers(Protocol):
+    """Workers that have been started for one kind of work.
+
+    Attributes
+    ----------
+    replaceable
+        Whether other workers can be started when these are lost.
+    """
+
+    replaceable: bool
+
+    def submit(self, job: Any, attempt: int = 0) -> Future[Any]:
+        """Give a job to the first worker that is free; `attempt` says how often it has failed."""
+
+    def result(self, future: Future[Any]) -> Any:
+        """Return the result of a job that is done, or raise JobFailed."""
+
+    def shutdown(self, running: Collection[Future[Any]]) -> None:
+        """End all workers; `running` are the futures that may not be done. Their stop flag is set, if any."""
+
+
+class TaskPool(Protocol):
+    """Runs functions in workers.
+
+    Attributes
+    ----------
+    replaceable
+        Whether another pool can be made when its workers are lost.
+    """
+
+    replaceable: bool
+
+    def submit(self, function: Callable[..., Any], /, *args: Any) -> Future[Any]:
+        """Have the first worker that is free call a function; if all are lost, the future says so."""
+
+    def shutdown(self, running: Collection[Future[Any]]) -> None:
+        """End all workers that are ours."""
+
+
+@runtime_checkable
+class DaskClient(Protocol):
+    """The part of `dask.distributed.Client` that is used."""
+
+    loop: Any  # of its network thread
+
+    def submit(self, function: Callable[..., Any], *args: Any, **options: Any) -> Any:
+        """Have a worker call a function."""
+
+    def gather(self, futures: Any, **options: Any) -> Any:
+        """Return the results of tasks."""
+
+    def scatter(self, data: Any, **options: Any) -> Any:
+        """Send data to the memory of workers."""
+
+    def nthreads(self) -> Mapping[str, int]:
+        """Return the number of threads of each worker."""
+
+
+class StoppableWork:
+    """A function of a job that is called only while the stop flag is not set."""
+
+    def __init__(self, work: Callable[[Any], Any], stop: SharedInt) -> None:
+        self._work, self.stop = work, stop
+
+    def __call__(self, job: Any) -> Any:
+        """Do a job, or raise `Stopped`."""
+        if self.stop.value:
+            raise Stopped
+        return self._work(job)
+
+
+WorkersMaker: TypeAlias = Callable[[StoppableWork, int, bool], Workers]  # with their number, and `strict`
+ExecutorMaker: TypeAlias = Callable[[int], Executor]  # called with the number of workers
 ExecutorLike: TypeAlias = Executor | ExecutorMaker | DaskClient
+
+
+class WarningsOfJobs:
+    """Repeats the warnings of jobs in the caller, each once."""
+
+    def __init__(self) -> None:
+        self._said: set[str] = set()
+
+    def repeat(self, messages: Iterable[str]) -> None:
+        """Warn of what has not been said yet."""
+        for message in messages:
+            if message not in self._said:
+                self._said.add(message)
+                warn_caller(message)
+
+
+def with_warnings(work: Callable[[Any], Any], job: Any) -> tuple[Any, tuple[str, ...]]:
+    """Do a job; return its result and its warnings."""
+    with collect_warnings() as messages:
+        return work(job), tuple(messages)
+
+
+class LocalWorkers:
+    """Workers that share the memory of this process, so that they need not be sent anything but jobs."""
+
+    def __init__(self, pool: TaskPool, work: Callable[[Any], Any]) -> None:
+        self.replaceable = pool.replaceable
+        self._pool, self._work, self._warnings = pool, work, WarningsOfJobs()
+
+    def submit(self, job: Any, attempt: int = 0) -> Future[Any]:
+        """Give a job to the first worker that is free."""
+        return self._pool.submit(with_warnings, self._work, job)
+
+    def result(self, future: Future[Any]) -> Any:
+        """Return the result of a job that is done; an error is raised as it is."""
+        result, messages = future.result()
+        self._warnings.repeat(messages)
+        return result
+
+    def shutdown(self, running: Collection[Future[Any]]) -> None:
+        """End the workers if they are ours."""
+        self._pool.shutdown(running)
+
+
+class ExecutorTasks:
+    """Runs functions in the workers of an executor, which ends with the render if it was made for it.
+
+    One that belongs to the caller goes on.
+    """
+
+    def __init__(self, executor: Executor, stop: SharedInt, replaceable: bool) -> None:
+        self._executor, self._stop, self.replaceable = executor, stop, replaceable
+
+    def submit(self, function: Callable[..., Any], /, *args: Any) -> Future[Any]:
+        """Have the first worker that is free call a function; if all are lost, the future says so."""
+        return submitted(self._executor, function, *args)
+
+    def shutdown(self, running: Collection[Future[Any]]) -> None:
+        """Withdraw jobs that have not begun, and wait for the others; for those of a caller a moment.
+
+        After a second Ctrl-C nobody waits.
+        """
+        if self.replaceable:
+            self._executor.shutdown(wait=all_done(running, math.inf, self._stop))
+        else:
+            all_done(running, END_TIMEOUT, self._stop)
+
+
+def submitted(executor: Executor, function: Callable[..., Any], /, *args: Any) -> Future[Any]:
+    """Hand a function to an executor; if all its workers are lost, the future says so."""
+    try:
+        return executor.submit(function, *args)
+    except BrokenExecutor as error:
+        failed: Future[Any] = Future()
+        failed.set_exception(error)
+        return failed
+
+
+def shares_memory(executor: Executor, stop: SharedInt) -> bool:
+    """Return whether the workers of an executor are in this process, as those that it has say themselves.
+
+    Raises
+    ------
+    Stopped
+        If the stop flag is set while an answer is waited for.
+    """
+    if isinstance(executor, ThreadPoolExecutor | ProcessPoolExecutor):
+        return isinstance(executor, ThreadPoolExecutor)
+    answer = executor.submit(_process)
+    while wait_for_futures([answer], POLL_INTERVAL).not_done:
+        if stop.value:
+            answer.cancel()
+            raise Stopped
+    return bool(answer.result() == _process())
+
+
+def _process() -> tuple[str, int]:
+    return platform.node(), os.getpid()
+
+
+def all_done(futures: Collection[Future[Any]], timeout: float, stop: SharedInt) -> bool:
+    """Cancel the futures that have not begun, and wait for the others.
+
+    Waits at most `timeout` seconds and not past a second Ctrl-C.
+
+    Returns
+    -------
+    bool
+        True if all are done.
+    """
+    running = [future for future in futures if not future.cancel()]
+    end = time.monotonic() + timeout
+    while wait_for_futures(running, POLL_INTERVAL).not_done:
+        if stop.value >= AT_ONCE or time.monotonic() > end:
+            return False
+    return True
 
 
 def _forks() -> bool:
@@ -94,13 +282,21 @@ def _users(executor: Executor, work: StoppableWork, count: int, strict: bool) ->
 def _workers_of(executor: Executor, pool: TaskPool, work: StoppableWork, strict: bool) -> Workers:
     if shares_memory(executor, work.stop):
         return LocalWorkers(pool, work)
+    from .remote import RemoteWorkers
+
     return RemoteWorkers(pool, work, strict)
+
+
+def _dask(client: DaskClient, work: StoppableWork, count: int, strict: bool) -> Workers:
+    from .remote import dask_workers
+
+    return dask_workers(client, work, count, strict)
 
 
 def _workers_maker(executor: ExecutorLike) -> WorkersMaker:
     """Return what starts the workers of an executor that a user gives."""
     if isinstance(executor, DaskClient):
-        return partial(dask_workers, executor)
+        return partial(_dask, executor)
     if isinstance(executor, Executor):
         return partial(_users, executor)
     return partial(_made, executor)
@@ -154,6 +350,22 @@ def _workers_in(executor: str | ExecutorLike | None) -> int | None:
         return None
     sizes = getattr(executor, "_max_workers", None), getattr(executor, "num_workers", None)  # the latter: MPI
     return next((size for size in sizes if isinstance(size, int) and size > 0), None)
+
+
+def threads_in(client: DaskClient) -> int:
+    """Return the number of threads of all workers of a cluster.
+
+    Raises
+    ------
+    SceneError
+        If the client does not tell, as it is closed.
+    """
+    try:
+        return sum(client.nthreads().values())
+    except Exception as error:  # of whatever kind: a closed client has lost its parts
+        raise SceneError(
+            f"executor is a client of Dask that does not answer: {error}; is it closed?"
+        ) from error
 
 
 def choose_executor(executor: str | ExecutorLike | None, workers: int, paths: int) -> str | ExecutorLike:

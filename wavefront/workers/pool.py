@@ -16,8 +16,7 @@ from ..arrays.soa import soa
 from ..core.errors import RenderError
 from ..core.interrupt import deferred_signals
 from ..core.shared import AT_ONCE, STOP, SharedInt, Stopped
-from .contract import JobFailed, StoppableWork, Workers, all_done
-from .executors import EXECUTORS, ExecutorLike
+from .executors import EXECUTORS, ExecutorLike, JobFailed, StoppableWork, Workers, all_done
 from .machine import single_threaded_blas
 
 Job = TypeVar("Job")

@@ -26,7 +26,7 @@ from typing import Any
 
 from ..core.interrupt import SIGNALS
 from ..core.shared import AT_ONCE, SharedInt
-from .contract import POLL_INTERVAL, LocalWorkers, StoppableWork, all_done, submitted
+from .executors import POLL_INTERVAL, LocalWorkers, StoppableWork, all_done, submitted
 from .machine import prepare_heap
 from .remote import RemoteWorkers
 
