@@ -29,7 +29,7 @@ from cornell_box import cornell_box
 
 STAGES = (
     "intersect",
-    "alpha_pass_through",
+    "pass_through",
     "emitted",
     "mis_weighted",
     "interaction",

@@ -5,6 +5,7 @@ import pytest
 
 import wavefront as wf
 from wavefront.accel import make_accelerator
+from wavefront.features.absorption import Absorption
 from wavefront.features.compiling import compile_scene
 
 ABSORPTION = np.array([0.2, 1.0, 3.0])
@@ -76,4 +77,5 @@ def test_thin_sheets_may_enclose_a_medium() -> None:
 def test_a_scene_without_media_skips_the_stage() -> None:
     for material in (wf.Diffuse(), filled(wf.Dielectric(), 0.0)):
         scene = wf.Scene([wf.Sphere((0, 0, 0), 1, material=material)], [wf.Environment(1.0)])
-        assert compile_scene(scene, lambda geometry: make_accelerator(geometry, "numpy")).absorption is None
+        compiled = compile_scene(scene, lambda geometry: make_accelerator(geometry, "numpy"))
+        assert compiled.program.find(Absorption) is None

@@ -9,6 +9,7 @@ from significance import render
 import wavefront as wf
 from wavefront.accel import make_accelerator
 from wavefront.compile.scene import CompiledScene
+from wavefront.features.alpha import Alpha
 from wavefront.features.compiling import compile_scene
 
 TRIANGLE = (np.eye(3), [[0, 1, 2]])
@@ -112,8 +113,9 @@ def test_materials_are_shaded_by_bsdf() -> None:
     assert scene.materials.normal_maps == (bumps,)
     assert scene.media is not None
     assert scene.media.entry_of.tolist() == [0, 0, 1, 0]
-    assert scene.opacities is not None
-    assert scene.opacities.constant.tolist() == [0.5, 1, 1, 1]
+    alpha = scene.program.find(Alpha)
+    assert alpha is not None
+    assert alpha.opacities.constant.tolist() == [0.5, 1, 1, 1]
 
 
 def test_shapes_of_one_bsdf_share_a_material() -> None:

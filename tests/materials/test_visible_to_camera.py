@@ -11,6 +11,7 @@ from scenes import ALL
 import wavefront as wf
 from wavefront.accel import make_accelerator
 from wavefront.features.compiling import compile_scene
+from wavefront.features.unseen import Unseen
 
 SIZE = (12, 12)
 UNSEEN = wf.Material(wf.Diffuse(0.3), visible_to_camera=False)
@@ -136,4 +137,4 @@ def test_scenes_without_it_have_no_table_of_it() -> None:
     for material, known in (("clay", False), (UNSEEN, True)):
         scene = wf.Scene(wall(material))
         compiled = compile_scene(scene, lambda geometry: make_accelerator(geometry, "numpy"))
-        assert (compiled.unseen is not None) == known
+        assert (compiled.program.find(Unseen) is not None) == known

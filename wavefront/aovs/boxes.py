@@ -14,9 +14,9 @@ import numpy as np
 from ..arrays.vec import Bools, Ints
 from ..camera import Camera
 from ..compile.scene import CompiledScene
-from ..stages.alpha import covering_hits
 from ..stages.generate import center_rays
 from ..stages.interaction import interaction
+from ..stages.passing import covering_hits
 from ..stages.transmittance import continue_behind
 from .geometric import ShapeTable, pixel_spans
 

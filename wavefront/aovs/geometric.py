@@ -19,10 +19,10 @@ from ..compile.scene import CompiledScene
 from ..film.aov_names import AOVS
 from ..materials import Material
 from ..shapes import Instance, Mesh, Shape
-from ..stages.alpha import covering_hits
 from ..stages.generate import center_rays
 from ..stages.interaction import interaction
 from ..stages.normal_mapping import perturb_normals
+from ..stages.passing import covering_hits
 
 RAYS_AT_ONCE = 1 << 16
 IDS = {"shape_id": "shape", "instance_id": "instance", "material_id": "material"}

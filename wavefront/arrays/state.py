@@ -6,7 +6,7 @@ Each field is declared once, with its shape and unit; `take`, `concatenate` and 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import fields
+from dataclasses import field, fields
 from enum import IntEnum
 from functools import cache
 from typing import Any, Self
@@ -31,7 +31,7 @@ class BounceDepth(IntEnum):
 
 @cache
 def _names(kind: type) -> tuple[str, ...]:
-    return tuple(field.name for field in fields(kind))
+    return tuple(each.name for each in fields(kind))
 
 
 class SoA:
@@ -106,6 +106,8 @@ class Rays(SoA):
     origin: Floats  # (3, n) start of the ray, scene units
     direction: Floats  # (3, n) unit direction
     exclude_prim: Ints  # (n,) primitive that the ray starts on, -1 for none
+    # (4, n) stack of what the rays are inside of; None in scenes without a `MediaTable`
+    media: Any = field(default=None, kw_only=True)
 
 
 @soa
@@ -119,7 +121,6 @@ class Paths(Rays):
     pdf: Floats  # (n,) density of the last BSDF sample, 1/sr; unused where specular
     specular: Bools  # (n,) the last direction is of a delta lobe or the camera: light sampling cannot find it
     roulette_scale: Floats  # (n,) throughput times this decides about roulette: see `stages.compact.roulette`
-    media: Any = None  # (4, n) stack of what the paths are inside of; None in scenes without a `MediaTable`
     glow: Floats | None = None  # (3, n) light that media have sent since the last event; None where none does
     prev_vertex: Floats | None = None  # (3, n) where the paths last scattered; None where that is `origin`
     # what lights were sampled for there (lights/base.py); None where no light of the scene takes it

@@ -121,18 +121,6 @@ def find_alpha(
     return found
 
 
-def find_shadow_catchers(materials: Sequence[Material]) -> Bools | None:
-    """Return a mask (materials,) of those that catch shadows; None if none does."""
-    found = np.array([material.bsdf.catches_shadows for material in materials], np.bool_)
-    return found if found.any() else None
-
-
-def find_unseen(materials: Sequence[Material]) -> Bools | None:
-    """Return a mask (materials,) of those that camera rays pass; None if there are none."""
-    found = np.array([not material.visible_to_camera for material in materials], np.bool_)
-    return found if found.any() else None
-
-
 def find_nonscattering_lights(
     materials: Sequence[Material], material_of: Ints, light_of: Ints, lights: int
 ) -> Bools | None:

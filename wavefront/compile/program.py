@@ -9,12 +9,12 @@ scene without features pays for none, and no stage asks for what is absent.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import field
+from dataclasses import field, replace
 from typing import TYPE_CHECKING, Any, ClassVar, Self, TypeVar
 
 from ..arrays.soa import soa
-from ..arrays.state import Contribution, Hits, Paths
-from ..arrays.vec import Bools, Floats, Ints
+from ..arrays.state import Contribution, Hits, Paths, Rays, SurfaceInteraction
+from ..arrays.vec import Bools, Floats, Ints, Lanes
 from ..materials import Material
 from ..scene import Scene
 
@@ -32,6 +32,7 @@ class Facts:
     materials: Sequence[Material]  # all of the scene, by their numbers
     has_alpha: Bools  # (m + k + 1,) primitives whose opacity is below 1
     asked: Mapping[str, Any]  # settings, by their names
+    given: Sequence[Feature]  # of the user's own
     found: list[Feature]  # those that the scene has, of those before in the order
 
 
@@ -51,6 +52,21 @@ class Leg:
     lanes: Ints = field(init=False)  # (k,) of the paths that go on
 
 
+@soa
+class Passage:
+    """Rays at surfaces that they, or a part of their light, may pass straight on."""
+
+    scene: CompiledScene
+    rays: Any  # n `Rays`, such as `Paths` and `ShadowRays`
+    surface: SurfaceInteraction
+    sampler: Sampler | None  # of paths; None where nothing is random
+    segment: int  # how many surfaces they have passed before
+
+    def take(self, lanes: Ints) -> Passage:
+        """Return some lanes (k,)."""
+        return replace(self, rays=self.rays.take(lanes), surface=self.surface.take(lanes))
+
+
 class Feature:
     """What few scenes have, and where it acts. A subclass overrides `of` and the points where it acts.
 
@@ -60,6 +76,10 @@ class Feature:
     ----------
     camera_only
         It acts on the first leg of paths from the camera alone, and not on those from sensors.
+    drawn
+        Its opacities draw random numbers, so that only paths meet them.
+    dims_shadows
+        Its surfaces let a part of the light of shadow rays through.
     compared
         Two renders must have it in common so that one can go on from the checkpoint of the other. False where
         it follows from settings, which are compared by themselves.
@@ -67,6 +87,8 @@ class Feature:
 
     __slots__ = ()
     camera_only: ClassVar[bool] = False
+    drawn: ClassVar[bool] = False
+    dims_shadows: ClassVar[bool] = False
     compared: ClassVar[bool] = True
 
     @classmethod
@@ -74,11 +96,45 @@ class Feature:
         """Return the feature of a scene; None if the scene does not have it."""
         return None
 
+    # --- Of paths from the camera ---------------------------------------------------------------------
+
+    def begin(self, scene: CompiledScene, paths: Paths) -> None:
+        """Give paths that start at the camera the columns that they need."""
+
     def fly(self, leg: Leg) -> None:
         """Change paths and their hits, before any light is added."""
 
     def meet(self, leg: Leg) -> None:
         """Change the light that paths meet, before it is added, and which paths go on."""
+
+    # --- Of straight rays of all kinds: of paths, to lights, from lights ------------------------------
+
+    def passable(self, scene: CompiledScene, rays: Rays, hits: Hits, lanes: Lanes) -> Bools:
+        """Return which of some lanes (k,) hit surfaces that rays, or a part of them, pass straight on."""
+        raise NotImplementedError
+
+    def thin(self, opacity: Floats, passage: Passage) -> None:
+        """Lower, in place, the opacities (n,) of surfaces."""
+        raise NotImplementedError
+
+    def cross(self, passage: Passage) -> None:
+        """Change the columns of rays that have passed their surfaces."""
+
+    def walk(self, leg: Leg, lanes: Ints, segment: int) -> Ints:
+        """Take some lanes (k,) of a leg to the next surfaces; return those that get there.
+
+        `segment` counts the surfaces that they have passed.
+        """
+        raise NotImplementedError
+
+    def dim(self, part: Floats, scene: CompiledScene, rays: Any, length: Floats, end: Bools) -> None:
+        """Lower, in place, what part (3, n) of light gets along shadow rays over some lengths (n,).
+
+        `end` (n,) says which rays end there.
+        """
+
+    def weaken(self, throughput: Floats, hits: Hits, surface: SurfaceInteraction) -> None:
+        """Weaken, in place, the throughput (3, n) of rays that have come to surfaces."""
 
 
 LEG_POINTS = ("fly", "meet")
@@ -88,9 +144,10 @@ AnyFeature = TypeVar("AnyFeature", bound=Feature)
 class LegProgram:
     """What acts on a leg: for each point, a tuple of what features do there; empty for most scenes."""
 
-    __slots__ = LEG_POINTS
+    __slots__ = (*LEG_POINTS, "see_through")
 
     def __init__(self, features: Sequence[Feature]) -> None:
+        self.see_through = tuple(each for each in features if acts(each, "passable"))
         self.fly, self.meet = (_at(features, point) for point in LEG_POINTS)
 
 
@@ -101,12 +158,32 @@ class Program:
     ----------
     features
         Those that the scene has, in the order in which they act.
+
+    Attributes
+    ----------
+    begin, walk, cross, dim, weaken
+        What acts at these points.
+    see_through
+        What shadow rays may pass.
+    seen_through
+        What rays of the camera may pass where nothing is random.
+    unseen
+        What the camera does not see as a surface.
+    dims_shadows
+        Whether shadow rays may arrive with a part of their light.
     """
 
     def __init__(self, features: Sequence[Feature] = ()) -> None:
         self.features = tuple(features)
         everywhere = [each for each in features if not each.camera_only]
         self._camera, self._later = LegProgram(self.features), LegProgram(everywhere)
+        self.begin, self.walk, self.cross, self.dim, self.weaken = (
+            _at(self.features, point) for point in ("begin", "walk", "cross", "dim", "weaken")
+        )
+        self.see_through = self._later.see_through
+        self.seen_through = tuple(each for each in self._camera.see_through if not each.drawn)
+        self.unseen = tuple(each for each in self._camera.see_through if each.camera_only)
+        self.dims_shadows = bool(self.dim) or any(each.dims_shadows for each in self.see_through)
 
     @classmethod
     def of(cls, facts: Facts, kinds: Sequence[type[Feature]]) -> Self:
@@ -115,7 +192,7 @@ class Program:
             feature = kind.of(facts)
             if feature is not None:
                 facts.found.append(feature)
-        return cls(facts.found)
+        return cls([*facts.found, *facts.given])
 
     def leg(self, bounce: int) -> LegProgram:
         """Return what acts on the leg that ends at a bounce."""

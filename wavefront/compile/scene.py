@@ -25,16 +25,11 @@ from .light_groups import BY_DEFAULT, LightGroups
 from .lights import gather_lights
 from .materials import (
     MaterialTable,
-    Opacities,
-    absorption_table,
     attributes_read,
     find_alpha,
     find_nonscattering_lights,
-    find_shadow_catchers,
-    find_unseen,
     group_materials,
     number_materials,
-    opacity_table,
 )
 from .media import MediaTable, glow_lights, media_of, media_table, phase_materials
 from .morton import MortonGrid
@@ -72,8 +67,6 @@ class CompiledScene:
     light_of: Ints  # (m + k + 1,) light of each primitive, and at the end that of a miss; -1 for none
     emissive: Bools  # (m + k + 1,) whether `light_of` names a light
     materials: MaterialTable
-    absorption: Floats | None  # (3, materials) per unit of length; None when nothing absorbs
-    opacities: Opacities | None  # None when every surface is opaque
     lights: LightTable
     light_groups: LightGroups[str]
     light_efficacies: LightGroups[float]  # lm/W, for measurements
@@ -81,8 +74,6 @@ class CompiledScene:
     nonscattering_lights: Bools | None
     instances: InstanceTable | None = None  # None when no mesh is instanced
     places: MortonGrid | None = None  # orders the paths of large scenes; None in small ones
-    shadow_catchers: Bools | None = None  # (materials,) those that catch shadows; None when none does
-    unseen: Bools | None = None  # (materials,) those that camera rays pass; None when there are none
     roulette_after: float = ROULETTE_AFTER  # scattering events before Russian roulette may end paths
     specular_surfaces: SpecularSurfaces | None = None  # for light tracing; None without it
     media: MediaTable | None = None  # None where none are, or each absorbs alone (absorption.py)
@@ -113,7 +104,7 @@ class CompiledScene:
         """Return the scene as the first rays of a camera meet it: sensors measure the light that is there."""
         if camera.sensor is None:
             return self
-        return replace(self, unseen=None, shadow_catchers=None, program=self.program.of_sensors())
+        return replace(self, program=self.program.of_sensors())
 
 
 def gather_scene(
@@ -205,7 +196,6 @@ def gather_scene(
             triangles[:once], table_of_curved, material_of.take(whole), light_of.take(whole), groups_of
         )
     groups, efficacies = numbered.groups(), numbered.efficacies()
-    absorption = absorption_table(user_materials) if media is None else None
     if media is not None:
         holds = (media.entry_of > 0).take(material_of[:once])
         media.touching = find_touching(triangles[:once], shape_of, material_of[:once], holds)
@@ -235,17 +225,13 @@ def gather_scene(
         light_of=light_of,
         emissive=light_of >= 0,
         materials=groups_of,
-        absorption=absorption,
-        opacities=opacity_table(user_materials, has_alpha),
         lights=lights,
         light_groups=groups,
         light_efficacies=efficacies,
         nonscattering_lights=nonscattering_lights,
         instances=table,
-        shadow_catchers=find_shadow_catchers(user_materials),
-        unseen=find_unseen(user_materials),
         specular_surfaces=specular,
         media=media,
         places=MortonGrid.over((high - low) / 2) if len(triangles) >= LARGE else None,
     )
-    return Facts(scene, compiled, user_materials, has_alpha, asked or {}, [])
+    return Facts(scene, compiled, user_materials, has_alpha, asked or {}, (), [])

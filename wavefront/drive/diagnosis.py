@@ -20,10 +20,10 @@ from ..integrators.registry import integrator_for
 from ..lights import LightSample
 from ..scene import Scene
 from ..shapes import Instance, Shape
-from ..stages.alpha import covering_hits
 from ..stages.generate import generate
 from ..stages.interaction import interaction, origin_above
 from ..stages.intersect import intersect, shadow_rays, visible
+from ..stages.passing import covering_hits
 from ..stages.shade import Shading
 from .final_checks import DIM, dim_blocks
 from .jobs import CameraJob

@@ -11,10 +11,28 @@ from ..compile.program import Feature, Program
 from ..compile.scene import CompiledScene, gather_scene
 from ..lights.choice import LightSamplerMaker
 from ..scene import Scene
+from .absorption import Absorption
+from .alpha import Alpha
 from .background import Backdrop, Background
+from .media import Glow, Media
+from .nested import Nested
+from .passing import Passing
+from .shadow_catchers import ShadowCatchers
+from .unseen import Unseen
 
 # In the order in which they act.
-FEATURES: tuple[type[Feature], ...] = (Backdrop, Background)
+FEATURES: tuple[type[Feature], ...] = (
+    Alpha,
+    Nested,
+    Unseen,
+    ShadowCatchers,
+    Absorption,
+    Media,
+    Passing,
+    Glow,
+    Backdrop,
+    Background,
+)
 
 
 def compile_scene(

@@ -29,20 +29,20 @@ from ..arrays.state import Hits, Paths, Rays, SoA, SurfaceInteraction, Words
 from ..arrays.vec import Bools, Doubles, Floats, Ints, broadcast, dot, f4, highest, length, take
 from ..camera import Camera
 from ..compile.media import stacks_leaving
+from ..compile.program import Leg, Passage
 from ..compile.scene import CompiledScene
 from ..compile.specular_surfaces import SpecularPoints, SpecularSurfaces
 from ..lights import LightSample
 from ..sampling.sampler import Dimension, Sampler
-from ..stages.alpha import alpha_pass_through
 from ..stages.bounce import bounce_sample
 from ..stages.compact import compact, roulette, select
 from ..stages.inside import stacks_at
-from ..stages.interaction import interaction, material_rows, offset_origin, origin_above
+from ..stages.interaction import interaction, offset_origin, origin_above
 from ..stages.intersect import ShadowRays, intersect, shadow_rays, visible
-from ..stages.medium import absorb, hidden
 from ..stages.normal_mapping import perturb_normals
+from ..stages.passing import pass_through
 from ..stages.shade import Shading, evaluate, radiance_at_samples, shading
-from ..stages.transmittance import transmittance_along
+from ..stages.transmittance import Veils, opacities_at, transmittance_along
 
 NEARBY = f4(16)  # error bounds within which another surface is at the same place
 LOWER_BITS = 2.0**-24  # of a number drawn: how far apart two of them are
@@ -86,11 +86,12 @@ def trace_light(
         lanes = roulette(scene, paths, sampler, bounce)
         paths = select(paths, lanes)
         hits = intersect(scene, paths)
-        if scene.absorption is not None:
+        if scene.program.weaken:
             t = np.where(hits.prim >= 0, hits.t, f4(0))
             _absorb(scene, paths.throughput, shade.surface.take(lanes), paths.direction, t)
-        paths, hits = alpha_pass_through(scene, paths, hits, sampler, bounce + 1)
-        paths, hits = compact(scene, paths, hits, hits.found)
+        leg = Leg(scene, sampler, bounce + 1, flux, False, paths.exclude_prim, paths, hits)
+        pass_through(leg)
+        paths, hits = compact(scene, leg.paths, leg.hits, leg.hits.found)
         if not len(paths):
             break
     else:
@@ -178,9 +179,9 @@ def _lit(
     cos = dot(surface.ng, light.wi)
     flux = np.zeros((3, slots), f4)
     arriving = arriving * (cos * f4(specular.area) / light.pdf)
-    flux[:, paths.slot] = arriving if scene.opacities is None else arriving * scene.opacities.at(surface)
-    lit = (highest(take(flux, paths.slot)) != 0) & ~hidden(scene, paths.media, surface.material)
-    lanes = np.flatnonzero(lit)
+    passage = Passage(scene, paths, surface, None, 0)
+    flux[:, paths.slot] = arriving * opacities_at(passage, scene.program.see_through)
+    lanes = np.flatnonzero(highest(take(flux, paths.slot)) != 0)
     lanes = lanes.compress(_first(scene, specular, rays.take(lanes)))
     return paths.take(lanes), hits.take(lanes), flux
 
@@ -195,13 +196,13 @@ def _first(scene: CompiledScene, specular: SpecularSurfaces, rays: ShadowRays) -
     return ~((found.t < 2 * away) & (found.prim < specular.found_as.take(rays.exclude_prim)))
 
 
-def _transmittance(scene: CompiledScene, rays: ShadowRays, absent: Bools | None = None) -> Floats:
+def _transmittance(scene: CompiledScene, rays: ShadowRays, veils: Veils = ()) -> Floats:
     """Return the transmittance (3, n), or (n,) where all surfaces are opaque, of rays that may be blocked.
 
-    `absent` says which materials (materials,) are not there for them.
+    `veils` are the features whose surfaces they may pass, beside those of shadow rays.
     """
-    if scene.opacities is not None or scene.media is not None or absent is not None:
-        return transmittance_along(scene, rays, absent)
+    if scene.program.dims_shadows or veils:
+        return transmittance_along(scene, rays, veils or scene.program.see_through)
     return visible(scene, rays).astype(f4)
 
 
@@ -222,7 +223,8 @@ def _absorb(
     A path from the camera comes the other way, and is weakened where it meets these surfaces from behind.
     """
     behind = surface.back_facing ^ (dot(surface.ng, direction) < 0)
-    absorb(scene, flux, Hits(t, surface.prim, None, None), replace(surface, back_facing=behind))
+    for weaken in scene.program.weaken:
+        weaken(flux, Hits(t, surface.prim, None, None), replace(surface, back_facing=behind))
 
 
 def _scatter(
@@ -304,7 +306,7 @@ def _connect(
     address = paths.pixel[:n], paths.sample[:n], bounce
     lens = sampler.draw_2d(*address, Dimension.LENS) if camera.uses_lens else None
     eye, film, importance = camera.connections(surface.point, scene.center, lens)
-    lanes = _seen(scene, camera, film, hits, n)
+    lanes = _seen(scene, camera, film, paths, hits, n)
     to_eye = take(eye, lanes) - surface.point.take(lanes, 1)
     distance = length(to_eye)
     wo = to_eye / distance
@@ -324,21 +326,20 @@ def _connect(
         cos_light=broadcast(f4(1), lit.size),
         media=None if stack is None else take(stack, lit),
     )
-    radiance = take(radiance, lit) * _transmittance(scene, rays, scene.unseen)
-    if scene.absorption is not None:
+    radiance = take(radiance, lit) * _transmittance(scene, rays, scene.program.seen_through)
+    if scene.program.weaken:
         _absorb(scene, radiance, seen, wo, rays.distance)
     at = lanes.take(lit)
     return Splats(paths.slot.take(at), _pixels(camera, film.take(at, 1)), radiance)
 
 
-def _seen(scene: CompiledScene, camera: Camera, film: Doubles, hits: Hits, n: int) -> Ints:
+def _seen(scene: CompiledScene, camera: Camera, film: Doubles, rays: Rays, hits: Hits, n: int) -> Ints:
     """Return those of the first n lanes whose film points (2, n) are in the camera's window."""
     x0, y0, x1, y1 = camera.window
     x, y = film
     inside = (x >= x0) & (x < x1) & (y >= y0) & (y < y1)
-    for left_out in (scene.shadow_catchers, scene.unseen):
-        if left_out is not None:
-            inside &= ~left_out.take(material_rows(scene, hits, slice(n)))
+    for veil in scene.program.unseen:
+        inside &= ~veil.passable(scene, rays, hits, slice(n))
     return np.flatnonzero(inside)
 
 

@@ -3,28 +3,23 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import replace
-
-import numpy as np
 
 from ..aovs.path_recorder import MetSurfaces
 from ..arrays.state import Contribution, Hits, Paths
-from ..arrays.vec import Floats, Ints, add_to_slots, f4, highest, take
+from ..arrays.vec import Floats, Ints, f4
 from ..compile.program import Leg
 from ..compile.scene import CompiledScene
 from ..guiding import GuideTable
 from ..sampling.sampler import Sampler
-from ..stages.alpha import alpha_pass_through
+from ..stages.accumulate import accumulate
 from ..stages.bounce import branch, copies
 from ..stages.compact import compact, roulette, scattering_lanes, select
 from ..stages.guidance import guide
 from ..stages.interaction import interaction
 from ..stages.intersect import intersect
-from ..stages.medium import absorb
 from ..stages.normal_mapping import perturb_normals
 from ..stages.sensors import at_sensors, sensor_shading
 from ..stages.shade import Shading, direct, emitted, mis_weighted, shading, without_caustics
-from ..stages.shadow_catcher import off_catchers
 
 
 def intersect_and_compact(
@@ -45,9 +40,6 @@ def intersect_and_compact(
         return paths, at_sensors(paths)
     acts = scene.program.leg(bounce)
     leg = Leg(scene, sampler, bounce, L, mis, paths.exclude_prim, paths, intersect(scene, paths))
-    leg.paths, leg.hits = alpha_pass_through(scene, leg.paths, leg.hits, sampler, bounce, mis)
-    if leg.paths.glow is not None:
-        leg.paths = collect_glow(L, leg.paths)
     for fly in acts.fly:
         fly(leg)
     leg.emission = emitted(scene, leg.paths, leg.hits)
@@ -56,21 +48,10 @@ def intersect_and_compact(
     for meet in acts.meet:
         meet(leg)
     accumulate(L, leg.paths, mis_weighted(scene, leg.paths, leg.emission) if mis else leg.emission)
-    if bounce == 0:
-        leg.lanes = off_catchers(scene, leg.hits, leg.lanes)
     kept = compact(scene, leg.paths, leg.hits, leg.lanes)
     if paths.recorder is not None:
         paths.recorder.record_hits(scene, MetSurfaces(bounce, leg.paths, leg.hits, leg.lanes, *kept))
     return kept
-
-
-def collect_glow(L: Floats, paths: Paths) -> Paths:
-    """Add what media have sent along paths to L; return the paths without it."""
-    assert paths.glow is not None
-    lanes = np.flatnonzero(highest(paths.glow) != 0)
-    glowing = replace(paths, throughput=np.ones_like(paths.glow), glow=None)
-    accumulate(L, glowing, Contribution(lanes, take(paths.glow, lanes), np.full(lanes.size, -1)))
-    return replace(paths, glow=None)
 
 
 def prepare_shading(scene: CompiledScene, paths: Paths, hits: Hits) -> Shading:
@@ -79,7 +60,8 @@ def prepare_shading(scene: CompiledScene, paths: Paths, hits: Hits) -> Shading:
         return sensor_shading(scene, paths)
     surface = interaction(scene, paths, hits)
     perturb_normals(scene, surface)
-    absorb(scene, paths.throughput, hits, surface)
+    for weaken in scene.program.weaken:
+        weaken(paths.throughput, hits, surface)
     shade = shading(scene, surface)
     if paths.recorder is not None:
         paths.recorder.record_surfaces(scene, paths, shade)
@@ -106,14 +88,3 @@ def scatter(
         accumulate(L, each, found)
     paths = branch(paths, shade, sampler, bounce, ways)
     return select(paths, roulette(scene, paths, sampler, bounce, branches))
-
-
-def accumulate(L: Floats, paths: Paths, contribution: Contribution) -> None:
-    """Add a contribution, times the throughput of its paths, to the slots of L."""
-    slot = take(paths.slot, contribution.lanes)
-    arriving = take(paths.throughput, contribution.lanes) * contribution.radiance
-    if paths.recorder is not None:
-        arriving = paths.recorder.clamped(paths, contribution, slot, arriving)
-    add_to_slots(L, slot, arriving)
-    if paths.recorder is not None:
-        paths.recorder.record_light(L, paths, contribution, slot, arriving)

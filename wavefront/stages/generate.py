@@ -10,7 +10,6 @@ from ..camera import Camera
 from ..compile.scene import CompiledScene
 from ..sampling.filters import Filter, box
 from ..sampling.sampler import Dimension, Sampler
-from .inside import stacks_at
 from .sensors import sensor_of_camera
 
 HALF = np.full((2, 1), 0.5, f4)
@@ -33,7 +32,7 @@ def generate(
     at = filter(sampler.draw_2d(pixel, sample, 0, Dimension.PIXEL))
     lens = sampler.draw_2d(pixel, sample, 0, Dimension.LENS) if camera.uses_lens else None
     origin, direction = camera.pixel_rays(pixel, at, scene.center, lens)
-    return Paths(
+    paths = Paths(
         slot=np.arange(n),
         pixel=pixel,
         sample=sample,
@@ -44,10 +43,12 @@ def generate(
         pdf=broadcast(f4(1), n),
         specular=broadcast(np.True_, n),
         roulette_scale=broadcast(f4(1) if sensor is None else f4(1) / sensor.total, n),
-        media=stacks_at(scene, origin),
         light_traced=None if scene.specular_surfaces is None else broadcast(np.True_, n),
         sensor=sensor,
     )
+    for begin in scene.program.begin:
+        begin(scene, paths)
+    return paths
 
 
 def center_rays(scene: CompiledScene, camera: Camera, pixel: Words) -> Rays:

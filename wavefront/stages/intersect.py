@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 
 from ..arrays.soa import soa
@@ -23,7 +21,6 @@ class ShadowRays(Rays):
     error: Floats  # (n,) bound on the rounding error of the points that they start from, scene units
     distance: Floats  # (n,) to the sampled point, scene units; inf for a light at infinity
     cos_light: Floats  # (n,) cosine between the ray and the light's normal; 1 where it has none
-    media: Any = None  # (4, n) as of `Paths`
     steps: StepNumbers | None = None  # for media that need them
     goal: Ints | None = None  # (n,) medium in which the light is, -1 for none; None where none is in one
 

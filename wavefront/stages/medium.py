@@ -1,4 +1,4 @@
-"""Rays through media: absorption, where light is scattered, and what paths are inside of."""
+"""Rays through media: where light is scattered, and what paths are inside of."""
 
 from __future__ import annotations
 
@@ -7,51 +7,31 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..arrays.elementary import exp
-from ..arrays.state import Hits, Paths, Rays, SurfaceInteraction
+from ..arrays.state import Paths, Rays, SurfaceInteraction
 from ..arrays.vec import TINY, Bools, Floats, Ints, dot, f4, take
 from ..compile.media import ENTRY, MediaTable, crossed
+from ..compile.program import Leg
 from ..compile.scene import CompiledScene
 from ..compile.touching import TouchingFaces
 from ..media.base import GlowWeights, MediumRays
-from ..sampling.sampler import Dimension, Sampler
+from ..sampling.sampler import Dimension
 from ..sampling.steps import StepNumbers
+from .intersect import ShadowRays
 
 LEAST_COS = f4(1 / 64)  # between a ray and a normal, for how far it is moved back
 
 
-def absorb(scene: CompiledScene, throughput: Floats, hits: Hits, surface: SurfaceInteraction) -> None:
-    """Attenuate, in place, the throughput of rays that crossed the medium behind the surface that they hit.
-
-    A ray that meets a surface from its back side has crossed its medium: over a length t the
-    throughput (3, n) falls by exp(−absorption·t) (Beer and Lambert).
-    """
-    if scene.absorption is None:
-        return
-    lanes = np.flatnonzero(surface.back_facing)
-    depth = scene.absorption.take(surface.material.take(lanes), 1) * hits.t.take(lanes)
-    throughput[:, lanes] *= exp(-depth)
-
-
-def fly(
-    scene: CompiledScene,
-    paths: Paths,
-    hits: Hits,
-    lanes: Ints,
-    sampler: Sampler,
-    bounce: int,
-    segment: int,
-    mis: bool,
-) -> Ints:
+def fly(leg: Leg, lanes: Ints, segment: int) -> Ints:
     """Let some lanes (k,) fly through their media, in place; return those that reach their surfaces.
 
-    With `mis` the light that media emit is weighted against light samples.
-
-    Those that are scattered before have `MediaTable.event_of` in place of a primitive, at that distance.
+    Those that are scattered before have `MediaTable.event_of` in place of a primitive, at that distance. What
+    media emit is weighted against light samples where these are taken.
     """
+    scene, paths, hits, sampler = leg.scene, leg.paths, leg.hits, leg.sampler
     media = scene.media
-    if media is None or paths.media is None:
-        return lanes
+    assert media is not None
+    if media.glows and not segment:
+        paths.glow = np.zeros_like(paths.origin)
     medium = media.medium_in(take(paths.media, lanes))
     inside = np.flatnonzero(medium >= 0)
     if not inside.size:
@@ -62,14 +42,14 @@ def fly(
         length = take(hits.t, some)
         paths.throughput[:, some] *= _through(media, paths, some, medium, length, None)
         return lanes
-    address = take(paths.pixel, some), take(paths.sample, some), bounce, Dimension.MEDIUM + segment
+    address = take(paths.pixel, some), take(paths.sample, some), leg.bounce, Dimension.MEDIUM + segment
     u = sampler.draw_2d(*address)
     steps = StepNumbers.of(sampler.seed, *address) if media.takes_steps else None
     for record, rows, column in media.by_record(medium):
         at = some.take(rows)
         throughput, length = take(paths.throughput, at), take(hits.t, at)
         rays = _within(column, paths, at, length, None if steps is None else steps.take(rows))
-        weights = _glow_weights(scene, paths, at, medium.take(rows)) if mis else None
+        weights = _glow_weights(scene, paths, at, medium.take(rows)) if leg.mis else None
         flight = record.sample(rays, throughput, take(u, rows), weights)
         if flight.light is not None and paths.glow is not None:
             paths.glow[:, at] += throughput * flight.light
@@ -102,14 +82,15 @@ def _glow_weights(scene: CompiledScene, paths: Paths, lanes: Ints, medium: Ints)
     return GlowWeights(ratio, dot(origin - take(start, lanes), take(paths.direction, lanes)))
 
 
-def arrives(scene: CompiledScene, stack: Any, goal: Any) -> Bools | None:
-    """Return whether rays that end with stacks (4, n) are within the media (n,) where they should end.
+def dim(part: Floats, scene: CompiledScene, rays: ShadowRays, length: Floats, end: Bools) -> None:
+    """Weaken, in place, the part (3, n) of light that gets over some lengths (n,) of shadow rays.
 
-    A goal is -1 for rays that end anywhere. None is returned where there is no goal.
+    None gets along rays that `end` (n,) outside of the medium where they should end.
     """
-    if scene.media is None or goal is None:
-        return None
-    return (goal < 0) | (scene.media.medium_in(stack) == goal)
+    part *= transmitted(scene, rays, rays.media, length, rays.steps)
+    if rays.goal is not None and scene.media is not None:
+        there = (rays.goal < 0) | (scene.media.medium_in(rays.media) == rays.goal)
+        part[:, end & ~there] = 0
 
 
 def transmitted(

@@ -84,7 +84,7 @@ def shared_points(
     good = np.ones(lanes.size, np.bool_)
     if scene.shading_normals:
         good &= dot(surface.ns, surface.wo) > GRAZING
-    if scene.absorption is not None:
+    if scene.program.weaken:
         good &= ~surface.back_facing
     matte = matte.take(lanes)
     some = np.concatenate([np.flatnonzero(good & matte), np.flatnonzero(good & ~matte)])
@@ -422,7 +422,7 @@ def connect(
     geometry = cos_target * inverse
     geometry *= inverse
     geometry *= possible
-    if scene.opacities is None and scene.media is None:
+    if not scene.program.dims_shadows:
         possible[member] = False
     lanes = np.flatnonzero(possible)
     error = first.error + target.error
@@ -465,7 +465,7 @@ def _absorb(of_rows: list[Connections], parts: list[Floats]) -> None:
 
 def _transmittance(scene: CompiledScene, rays: ShadowRays) -> Floats:
     """Return the part (k,) of light that gets along rays."""
-    if scene.opacities is None:
+    if not scene.program.see_through:
         return visible(scene, rays).astype(f4)
     return transmittance_along(scene, rays)[0]
 
@@ -486,8 +486,8 @@ def can_reuse(scene: CompiledScene) -> bool:
     """
     if scene.media is not None and not scene.media.only_absorbs:
         return False
-    absorbs = scene.absorption is not None or scene.media is not None
-    mixed = scene.opacities is not None and absorbs
+    absorbs = scene.program.weaken or scene.program.dim
+    mixed = absorbs and any(veil.dims_shadows for veil in scene.program.see_through)
     return not mixed and bool((shared_materials(scene) | glossy_materials(scene)).any())
 
 

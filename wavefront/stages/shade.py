@@ -15,6 +15,7 @@ from ..arrays.vec import ALL, TINY, Floats, Ints, Lanes, broadcast, column, dot,
 from ..bsdfs import Bsdf, albedo_of, evaluated
 from ..compile.materials import MaterialTable
 from ..compile.media import stacks_leaving
+from ..compile.program import Passage
 from ..compile.scene import CompiledScene
 from ..guiding import GuideTable
 from ..lights import LightSample, Receiver
@@ -25,7 +26,7 @@ from .interaction import interaction, offset_origin, origin_above
 from .intersect import ShadowRays, shadow_rays, visible
 from .medium import crossings
 from .normal_mapping import folded_onto
-from .transmittance import transmittance_along
+from .transmittance import opacities_at, transmittance_along
 
 UP = column((0, 0, 1))
 
@@ -289,7 +290,7 @@ def direct(
             rays.steps = StepNumbers.of(sampler.seed, *which, bounce, Dimension.TRANSMITTANCE)
     number = take(number, lanes)
     radiance = radiance_at_samples(scene, rays, light, lanes, number)
-    if scene.opacities is not None or scene.media is not None:
+    if scene.program.dims_shadows:
         radiance = radiance * transmittance_along(scene, rays)
     else:
         seen = np.flatnonzero(visible(scene, rays))
@@ -335,7 +336,10 @@ def radiance_at_samples(
     )
     found = scene.lights.le(number.take(some), rays.direction, surface.take)
     radiance = radiance.copy()
-    radiance[:, some] = found if scene.opacities is None else found * scene.opacities.at(surface)
+    if scene.program.see_through:
+        unhidden = replace(rays, media=None)  # what is around hides no surface from samples on it
+        found = found * opacities_at(Passage(scene, unhidden, surface, None, 0), scene.program.see_through)
+    radiance[:, some] = found
     return radiance
 
 

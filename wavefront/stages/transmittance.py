@@ -1,103 +1,85 @@
-"""The transmittance of shadow rays through surfaces with alpha, and rays that go on behind surfaces."""
+"""The transmittance of shadow rays through what they may pass, and rays that go on behind surfaces."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
-from typing import Any, TypeVar
+from typing import TypeAlias, TypeVar
 
 import numpy as np
 
 from ..arrays.state import Hits, Rays, SurfaceInteraction
 from ..arrays.vec import ALL, Bools, Floats, Lanes, dot, f4, take
+from ..compile.program import Feature, Passage
 from ..compile.scene import CompiledScene
-from .interaction import interaction, material_rows, offset_origin
+from .interaction import interaction, offset_origin
 from .intersect import ShadowRays, intersect, shadow_ray_length, visible
-from .medium import absorb, arrives, cross, hidden, transmitted
 
 AnyRays = TypeVar("AnyRays", bound=Rays)
+Veils: TypeAlias = Sequence[Feature]  # those whose surfaces some rays may pass
 
 
-def transmittance_along(scene: CompiledScene, rays: ShadowRays, absent: Bools | None = None) -> Floats:
+def transmittance_along(scene: CompiledScene, rays: ShadowRays, veils: Veils | None = None) -> Floats:
     """Return the transmittance of shadow rays, (3, k).
 
-    Only rays that hit anything are traced on from surface to surface. `absent` says which materials
-    (materials,) are not there for them.
+    Only rays that hit anything are traced on from surface to surface. `veils` are the features whose surfaces
+    they may pass; by default, those of shadow rays.
     """
+    veils = scene.program.see_through if veils is None else veils
     part = np.ones_like(rays.direction)
     seen = visible(scene, rays)
-    if rays.media is not None:
-        lanes = np.flatnonzero(seen)
-        free = rays.take(lanes)
-        part[:, lanes] = transmitted(scene, free, free.media, free.distance, free.steps)
-        there = arrives(scene, free.media, free.goal)
-        if there is not None:
-            part[:, lanes.compress(~there)] = 0
+    for dim in scene.program.dim:
+        free = np.flatnonzero(seen)
+        some, left = rays.take(free), take(part, free)
+        dim(left, scene, some, some.distance, np.ones(free.size, np.bool_))
+        part[:, free] = left
     lanes = np.flatnonzero(~seen)
-    if absent is None and not may_pass(scene):
+    if not veils:
         part[:, lanes] = 0
         return part
     rays = rays.take(lanes)
     while lanes.size:
         hits = intersect(scene, rays)
         between = hits.t < shadow_ray_length(rays)
-        passes = passable(scene, hits, ALL, rays.media, absent)
-        part[:, lanes.compress(between & ~passes)] = 0
-        if rays.media is not None:
-            length = np.where(between, hits.t, rays.distance)
-            part[:, lanes] *= transmitted(scene, rays, rays.media, length, rays.steps)
-            there = arrives(scene, rays.media, rays.goal)
-            if there is not None:
-                part[:, lanes.compress(~between & ~there)] = 0
-        met = np.flatnonzero(between & passes)
-        lanes, rays, hits = lanes.take(met), rays.take(met), hits.take(met)
-        surface = interaction(scene, rays, hits)
-        left = part.take(lanes, 1) * (f4(1) - opacities_at(scene, surface, rays.media, absent))
-        absorb(scene, left, hits, surface)
+        passes = passable(scene, rays, hits, ALL, veils)
+        left = take(part, lanes)
+        left[:, between & ~passes] = 0
+        for dim in scene.program.dim:
+            dim(left, scene, rays, np.where(between, hits.t, rays.distance), ~between)
         part[:, lanes] = left
-        rays = replace(
-            continue_behind(rays, surface),
-            error=rays.error + surface.error,
+        met = np.flatnonzero(between & passes)
+        lanes, left, rays, hits = lanes.take(met), take(left, met), rays.take(met), hits.take(met)
+        passage = Passage(scene, rays, interaction(scene, rays, hits), None, 0)
+        left *= f4(1) - opacities_at(passage, veils)
+        for weaken in scene.program.weaken:
+            weaken(left, hits, passage.surface)
+        part[:, lanes] = left
+        rays = passage.rays = replace(
+            continue_behind(rays, passage.surface),
+            error=rays.error + passage.surface.error,
             distance=rays.distance - hits.t,
-            media=cross(scene, rays.media, surface),
             steps=None if rays.steps is None else rays.steps.again(),
         )
+        for cross in scene.program.cross:
+            cross(passage)
         on = np.flatnonzero(left.max(0) != 0)
         lanes, rays = lanes.take(on), rays.take(on)
     return part
 
 
-def may_pass(scene: CompiledScene) -> bool:
-    """Return whether rays may pass any surface: by its alpha, or because a higher priority hides it."""
-    return scene.opacities is not None or (scene.media is not None and bool(scene.media.nested.any()))
-
-
-def passable(
-    scene: CompiledScene, hits: Hits, lanes: Lanes, stack: Any, absent: Bools | None = None
-) -> Bools:
-    """Return whether some lanes (k,) hit surfaces that rays with stacks (4, k) may pass straight on.
-
-    `absent` says which materials (materials,) are not there for them.
-    """
-    prim = take(hits.prim, lanes)
-    found: Bools = np.zeros(prim.size, np.bool_)
-    if scene.opacities is not None:
-        found = scene.opacities.has_alpha.take(prim)  # a miss, -1, takes the last entry
-    if stack is not None:
-        found |= hidden(scene, stack, material_rows(scene, hits, lanes)) & (prim >= 0)
-    if absent is not None:
-        found |= absent.take(material_rows(scene, hits, lanes)) & (prim >= 0)
+def passable(scene: CompiledScene, rays: Rays, hits: Hits, lanes: Lanes, veils: Veils) -> Bools:
+    """Return whether some lanes (k,) hit surfaces that rays may pass straight on."""
+    found = np.zeros(take(hits.prim, lanes).size, np.bool_)
+    for veil in veils:
+        found |= veil.passable(scene, rays, hits, lanes)
     return found
 
 
-def opacities_at(
-    scene: CompiledScene, surface: SurfaceInteraction, stack: Any, absent: Bools | None = None
-) -> Floats:
-    """Return the opacities (n,) of surfaces to rays with stacks (4, n); those of `absent` materials are 0."""
-    opacity: Floats = np.ones(len(surface), f4) if scene.opacities is None else scene.opacities.at(surface)
-    if stack is not None:
-        opacity[hidden(scene, stack, surface.material)] = 0
-    if absent is not None:
-        opacity[absent.take(surface.material)] = 0
+def opacities_at(passage: Passage, veils: Veils) -> Floats:
+    """Return the opacities (n,) of surfaces to the rays that have hit them."""
+    opacity = np.ones(len(passage.surface), f4)
+    for veil in veils:
+        veil.thin(opacity, passage)
     return opacity
 
 

@@ -1,33 +1,67 @@
-"""The opacity of shadow catchers to camera rays: the part of the direct light that something blocks."""
+"""Shadow catchers: the camera sees only the shadows on them.
+
+Their opacity to camera rays is the part of the direct light that something blocks.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Iterator
+from typing import Self
 
 import numpy as np
 
-from ..arrays.state import Hits, Paths, SurfaceInteraction
-from ..arrays.vec import INV_PI, Floats, Ints, dot, f4, luminance, positive, take
+from ..arrays.soa import soa
+from ..arrays.state import Hits, Paths, Rays, SurfaceInteraction
+from ..arrays.vec import INV_PI, Bools, Floats, Ints, Lanes, dot, f4, luminance, positive, take
+from ..compile.program import Facts, Feature, Leg, Passage
 from ..compile.scene import CompiledScene
 from ..lights import LightSample, Receiver
 from ..sampling.mis import power_heuristic
 from ..sampling.sampler import Dimension, Sampler
 from ..sampling.steps import StepNumbers
 from ..sampling.warp import cosine_hemisphere
-from .interaction import material_rows, origin_above
-from .intersect import ShadowRays, shadow_rays, visible
-from .transmittance import transmittance_along
+from ..stages.interaction import material_rows, origin_above
+from ..stages.intersect import ShadowRays, shadow_rays, visible
+from ..stages.transmittance import transmittance_along
 
 CANDIDATES = 8  # of light samples, and again of directions, at each point
 FIRST_VERTEX = 2**17  # candidates draw numbers as at vertices beyond those of any path
 
 
-def catcher_lanes(scene: CompiledScene, hits: Hits, lanes: Ints) -> Ints:
-    """Return those of some lanes (k,) that hit a shadow catcher."""
-    if scene.shadow_catchers is None:
-        return lanes[:0]
-    met = lanes.compress(take(hits.prim, lanes) >= 0)
-    return met.compress(scene.shadow_catchers.take(material_rows(scene, hits, met)))
+@soa
+class ShadowCatchers(Feature):
+    """Shows the camera the shadows on some surfaces, and nothing else of these."""
+
+    camera_only = True
+    drawn = True
+    catching: Bools  # (materials,)
+
+    @classmethod
+    def of(cls, facts: Facts) -> Self | None:
+        """Return the feature of a scene where a material catches shadows."""
+        catching = np.array([material.bsdf.catches_shadows for material in facts.materials], np.bool_)
+        return cls(catching) if catching.any() else None
+
+    def passable(self, scene: CompiledScene, rays: Rays, hits: Hits, lanes: Lanes) -> Bools:
+        """Return which of some lanes (k,) hit shadow catchers."""
+        return self.catching.take(material_rows(scene, hits, lanes)) & (take(hits.prim, lanes) >= 0)
+
+    def thin(self, opacity: Floats, passage: Passage) -> None:
+        """Lower the opacities of catchers to those of the shadows on them."""
+        lanes = np.flatnonzero(self.catching.take(passage.surface.material))
+        if not lanes.size:
+            return
+        at, before = passage.take(lanes), opacity.take(lanes)
+        assert at.sampler is not None
+        opacity[lanes] = before * shadow_opacity(at.scene, at.rays, at.surface, at.sampler)
+        if at.rays.light_traced is not None:
+            # Paths from lights do not know how well lit a catcher is: it stops them.
+            u = at.sampler.draw_1d(at.rays.pixel, at.rays.sample, 0, Dimension.OPACITY + at.segment)
+            passage.rays.light_traced[lanes] &= ~((u < before) & (u >= opacity.take(lanes)))
+
+    def meet(self, leg: Leg) -> None:
+        """End paths that hit catchers: shadows on these are black."""
+        leg.lanes = leg.lanes.compress(~self.catching.take(material_rows(leg.scene, leg.hits, leg.lanes)))
 
 
 def shadow_opacity(
@@ -52,10 +86,10 @@ def shadow_opacity(
     rays = shadow_rays(surface, start, sample, lit)
     _enter_media(scene, paths, sampler, rays, lit, which)
     opacity = np.zeros(n, f4)
-    if scene.opacities is None and scene.media is None:
-        opacity[lit] = ~visible(scene, rays)
-    else:
+    if scene.program.dims_shadows:
         opacity[lit] = f4(1) - luminance(transmittance_along(scene, rays))
+    else:
+        opacity[lit] = ~visible(scene, rays)
     return opacity
 
 
@@ -107,10 +141,3 @@ def _candidates(
         radiance = scene.lights.le(numbers, wi)
         far = LightSample(wi, radiance, local[2] * INV_PI, np.full(n, np.inf, f4), np.ones(n, f4))
         yield far, numbers, luminance(radiance) * f4(np.pi) * weight
-
-
-def off_catchers(scene: CompiledScene, hits: Hits, lanes: Ints) -> Ints:
-    """Return those of some lanes (k,) that hit no shadow catcher: shadows on these are black."""
-    if scene.shadow_catchers is None:
-        return lanes
-    return lanes.compress(~scene.shadow_catchers.take(material_rows(scene, hits, lanes)))
