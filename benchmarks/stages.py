@@ -29,7 +29,6 @@ from cornell_box import cornell_box
 
 STAGES = (
     "intersect",
-    "pass_through",
     "emitted",
     "mis_weighted",
     "interaction",

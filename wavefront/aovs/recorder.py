@@ -11,11 +11,13 @@ from typing import Any
 
 import numpy as np
 
+from ..arrays.path_recorder import NOBODY, PathRecorder
 from ..arrays.soa import soa
 from ..arrays.state import BounceDepth, Contribution, Hits, Paths
 from ..arrays.vec import Bools, Bytes, Floats, Ints, add_to_slots, broadcast, f4, put, take
 from ..colors import EFFICACY
 from ..compile.light_groups import PATCHED, LightGroups
+from ..compile.program import Leg
 from ..compile.scene import CompiledScene
 from ..core.errors import SceneError
 from ..film.aov_names import AOVS, CLAMPED, KEYED_AOVS, LUX, NARROW
@@ -26,11 +28,20 @@ from ..stages.normal_mapping import perturb_normals
 from ..stages.shade import Shading, shading
 from .lux import lux_of
 from .narrow_lobes import NarrowLobes
-from .path_recorder import MetSurfaces, PathRecorder
 
 FEATURES = ("denoising_albedo", "denoising_normal")
 OF_LIGHT = ("direct", "indirect", "light_groups", CLAMPED)
 BY_LIGHT = ("light_groups", LUX)  # what parts of the light are told apart for by the light they are from
+
+# (3, 2) the depth after a scattering, by the depth before it and by whether it is specular
+DEPTH_AFTER = np.array(
+    [
+        [BounceDepth.DIRECT, BounceDepth.CAMERA],
+        [BounceDepth.INDIRECT, BounceDepth.INDIRECT],
+        [BounceDepth.INDIRECT, BounceDepth.INDIRECT],
+    ],
+    np.uint8,
+)
 
 
 @soa
@@ -101,12 +112,13 @@ class SampleRecorder(PathRecorder):
         """Note that each path goes on in several ways."""
         self._share /= ways
 
-    def of_shared(self, count: int) -> SampleRecorder | None:
+    def of_shared(self, count: int) -> PathRecorder:
         """Return what divides the light of so many shared points among the groups of lights."""
         wanted = [name for name in BY_LIGHT if name in self._wanted and self._divided]
         wanted += [NARROW] if self._narrow is not None else []
-        if wanted:
-            self._shared = SampleRecorder(wanted, self._scene, count)
+        if not wanted:
+            return NOBODY
+        self._shared = SampleRecorder(wanted, self._scene, count)
         return self._shared
 
     def parts_of_shared(self) -> list[tuple[Floats, Floats]]:
@@ -121,10 +133,10 @@ class SampleRecorder(PathRecorder):
 
     # --- Surfaces -------------------------------------------------------------------------------------
 
-    def record_hits(self, scene: CompiledScene, met: MetSurfaces) -> None:
+    def record_hits(self, leg: Leg) -> None:
         """Record what paths meet next; see `PathRecorder`."""
         self._shade_awaited()
-        (paths, hits), first, self._begun = (met.paths, met.hits), not self._begun, True
+        (scene, paths, hits), first, self._begun = (leg.scene, leg.paths, leg.hits), not self._begun, True
         if self._narrow is not None:
             self._narrow.record(paths)
         if first and "alpha" in self._values:
@@ -134,14 +146,14 @@ class SampleRecorder(PathRecorder):
         if not self._needs_surfaces(paths, first):
             return
         ends = hits.prim != -1
-        ends[met.kept] = False
+        ends[leg.lanes] = False
         if ends.any():
             self._awaited = AwaitedSurfaces(
                 scene, *compact(scene, paths, hits, np.flatnonzero(ends)), first=first
             )
             self._shade_awaited()
-        if len(met.kept_paths):
-            self._awaited = AwaitedSurfaces(scene, met.kept_paths, met.kept_hits, first)
+        if len(leg.kept_paths):
+            self._awaited = AwaitedSurfaces(scene, leg.kept_paths, leg.kept_hits, first)
 
     def record_surfaces(self, scene: CompiledScene, paths: Paths, shade: Shading) -> None:
         """Record the surfaces that paths have met, which are ready to shade."""
@@ -193,6 +205,11 @@ class SampleRecorder(PathRecorder):
             paths.met_rough = broadcast(np.True_, end)
         else:
             paths.met_rough[lanes[rough]] = True
+
+    def record_scattering(self, paths: Paths, shade: Shading, left: Paths) -> None:
+        """Keep how deep paths are."""
+        if paths.depth is not None:
+            left.depth = _after(paths.depth, left.specular)
 
     # --- Light ----------------------------------------------------------------------------------------
 
@@ -417,3 +434,11 @@ def _is_direct(depth: Bytes, contribution: Contribution) -> Bools:
     """Return a mask (k,) of the contributions that count for the AOV "direct"."""
     at = take(depth, contribution.lanes)
     return at == BounceDepth.CAMERA if contribution.sampled else at <= BounceDepth.DIRECT
+
+
+def _after(depth: Bytes, specular: Bools) -> Bytes:
+    """Return `Paths.depth` (n,) after another scattering, which is specular (n,) or not."""
+    n = depth.size
+    if n and not (depth.strides[0] or specular.strides[0]):  # alike on all lanes
+        return broadcast(_after(depth[:1].copy(), specular[:1].copy())[0], n)
+    return DEPTH_AFTER[depth, specular.view(np.uint8)]

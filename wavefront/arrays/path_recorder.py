@@ -2,30 +2,18 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
 
-from ..arrays.state import Contribution, Hits, Paths
-from ..arrays.vec import Floats, Ints
-from ..compile.scene import CompiledScene
-from ..stages.shade import Shading
+from .vec import Floats, Ints
 
-
-@dataclass(frozen=True, slots=True)
-class MetSurfaces:
-    """What the paths of a wave meet."""
-
-    bounce: int
-    paths: Paths
-    hits: Hits
-    kept: Ints  # (k,) lanes that go on
-    kept_paths: Paths  # those, as they will be shaded
-    kept_hits: Hits
+if TYPE_CHECKING:
+    from .state import Contribution, Paths
 
 
 class PathRecorder:
     """Is told of each step of the paths that carry it (`Paths.recorder`), whatever their integrator.
 
-    Each method does nothing by itself.
+    Each method does nothing by itself. What is shaded is a `Shading`.
 
     Attributes
     ----------
@@ -38,21 +26,21 @@ class PathRecorder:
     def branched(self, ways: int) -> None:
         """Note that each path goes on in several ways."""
 
-    def of_shared(self, count: int) -> PathRecorder | None:
-        """Return what looks on where paths begin anew at so many shared points; None for nothing."""
-        return None
+    def of_shared(self, count: int) -> PathRecorder:
+        """Return what looks on where paths begin anew at so many shared points."""
+        return NOBODY
 
     def parts_of_shared(self) -> list[tuple[Floats, Floats]]:
         """Return parts of the light, (3, n) of the samples, and (3, count) of the shared points."""
         return []
 
-    def record_hits(self, scene: CompiledScene, met: MetSurfaces) -> None:
-        """Record what paths meet next, after the light that they meet there."""
+    def record_hits(self, leg: Any) -> None:
+        """Record what paths have met at the end of a `Leg`, after the light there."""
 
-    def record_surfaces(self, scene: CompiledScene, paths: Paths, shade: Shading) -> None:
+    def record_surfaces(self, scene: Any, paths: Paths, shade: Any) -> None:
         """Record the surfaces that paths have met, which are ready to shade."""
 
-    def record_scattering(self, paths: Paths, shade: Shading, left: Paths) -> None:
+    def record_scattering(self, paths: Paths, shade: Any, left: Paths) -> None:
         """Record how `paths` leave their surfaces, before any of them ends."""
 
     def clamped(self, paths: Paths, contribution: Contribution, slot: Ints, arriving: Floats) -> Floats:
@@ -66,3 +54,6 @@ class PathRecorder:
 
     def record_background(self, slot: Ints, color: Floats) -> None:
         """Record what has arrived of a background, (3, k), and has been added to slots (k,)."""
+
+
+NOBODY = PathRecorder()  # where nothing else looks on

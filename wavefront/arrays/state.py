@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .frame import Frame
+from .path_recorder import NOBODY, PathRecorder
 from .soa import soa
 from .vec import Bools, Bytes, Floats, Ints, Lanes, take
 
@@ -133,7 +134,7 @@ class Paths(Rays):
     # for layers (aovs/recorder.py); None unless they are asked for
     depth: Bytes | None = None  # (n,) a `BounceDepth`
     met_rough: Bools | None = None  # (n,) the path has met a surface that is not specular
-    recorder: Any = None  # the `PathRecorder` of the wave
+    recorder: PathRecorder = NOBODY  # of the wave
 
 
 @soa

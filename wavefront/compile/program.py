@@ -50,6 +50,8 @@ class Leg:
     hits: Hits
     emission: Contribution = field(init=False)  # what the paths meet
     lanes: Ints = field(init=False)  # (k,) of the paths that go on
+    kept_paths: Paths = field(init=False)  # those, as they will be shaded
+    kept_hits: Hits = field(init=False)
 
 
 @soa

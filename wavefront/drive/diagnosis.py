@@ -7,11 +7,12 @@ from functools import cache, cached_property
 
 import numpy as np
 
-from ..aovs.path_recorder import MetSurfaces, PathRecorder
+from ..arrays.path_recorder import PathRecorder
 from ..arrays.state import Contribution, Hits, Paths, Rays, SurfaceInteraction, Words
 from ..arrays.vec import Bools, Floats, Ints, dot, f4
 from ..camera import Camera
 from ..compile.instances import sort_shapes
+from ..compile.program import Leg
 from ..compile.scene import CompiledScene
 from ..core.errors import warn_caller
 from ..image import Image
@@ -307,11 +308,11 @@ class NanRecorder(PathRecorder):
         self._bounce = 1
         return self
 
-    def record_hits(self, scene: CompiledScene, met: MetSurfaces) -> None:
+    def record_hits(self, leg: Leg) -> None:
         """Keep the bounce, which that of light met before it is, too."""
-        self._bounce = met.bounce
+        self._bounce = leg.bounce
         if self._bad_emission:
-            self._note(f"bounce {met.bounce}, emission that the path meets")
+            self._note(f"bounce {leg.bounce}, emission that the path meets")
 
     def record_surfaces(self, scene: CompiledScene, paths: Paths, shade: Shading) -> None:
         """Check what absorption has left of the paths, and the AOVs that the surfaces give."""

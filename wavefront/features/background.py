@@ -59,6 +59,5 @@ class Background(Feature):
         slot = take(leg.paths.slot, missed)
         arriving = take(leg.paths.throughput, missed) * self.color
         leg.L[:, slot] += arriving
-        if leg.paths.recorder is not None:
-            leg.paths.recorder.record_background(slot, arriving)
+        leg.paths.recorder.record_background(slot, arriving)
         leg.emission = leg.emission.take(np.flatnonzero(take(leg.hits.prim, leg.emission.lanes) >= 0))

@@ -92,7 +92,7 @@ class Sharing:
             glossy, more = self._glossy(begun.take(some), hits.take(some), light)
             ways += more
         self._follow(ways, 2, light)
-        sums = [(L, light), *([] if first.recorder is None else first.recorder.parts_of_shared())]
+        sums = [(L, light), *first.recorder.parts_of_shared()]
         for to, found in sums:
             found[:, :matte] *= f4(1 / SHARED_WAYS)
             add_to_slots(to, points.slot[some], points.throughput[:, some] * found[:, lanes.size :][:, :g])

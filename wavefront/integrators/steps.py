@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-from ..aovs.path_recorder import MetSurfaces
 from ..arrays.state import Contribution, Hits, Paths
 from ..arrays.vec import Floats, Ints, f4
 from ..compile.program import Leg
@@ -48,10 +47,9 @@ def intersect_and_compact(
     for meet in acts.meet:
         meet(leg)
     accumulate(L, leg.paths, mis_weighted(scene, leg.paths, leg.emission) if mis else leg.emission)
-    kept = compact(scene, leg.paths, leg.hits, leg.lanes)
-    if paths.recorder is not None:
-        paths.recorder.record_hits(scene, MetSurfaces(bounce, leg.paths, leg.hits, leg.lanes, *kept))
-    return kept
+    leg.kept_paths, leg.kept_hits = compact(scene, leg.paths, leg.hits, leg.lanes)
+    paths.recorder.record_hits(leg)
+    return leg.kept_paths, leg.kept_hits
 
 
 def prepare_shading(scene: CompiledScene, paths: Paths, hits: Hits) -> Shading:
@@ -63,8 +61,7 @@ def prepare_shading(scene: CompiledScene, paths: Paths, hits: Hits) -> Shading:
     for weaken in scene.program.weaken:
         weaken(paths.throughput, hits, surface)
     shade = shading(scene, surface)
-    if paths.recorder is not None:
-        paths.recorder.record_surfaces(scene, paths, shade)
+    paths.recorder.record_surfaces(scene, paths, shade)
     return shade
 
 

@@ -9,7 +9,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from ..aovs.path_recorder import PathRecorder
+from ..arrays.path_recorder import PathRecorder
 from ..arrays.soa import soa
 from ..arrays.state import Contribution, Paths, SoA, Words
 from ..arrays.vec import Floats, Ints, highest, take

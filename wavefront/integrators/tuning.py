@@ -20,11 +20,12 @@ from dataclasses import replace
 import numpy as np
 
 from ..accel.counter import RayCounter
-from ..aovs.path_recorder import MetSurfaces, PathRecorder
+from ..arrays.path_recorder import PathRecorder
 from ..arrays.soa import soa
 from ..arrays.state import Contribution, Paths, Words
 from ..arrays.vec import ALL, Doubles, Floats, Ints, f4
 from ..camera import Camera
+from ..compile.program import Leg
 from ..compile.scene import CompiledScene
 from ..guiding import GuideTable
 from ..sampling.sampler import Sampler
@@ -234,10 +235,10 @@ class SecondPoints(PathRecorder):
         """Keep the picture, to which all light is added."""
         self._picture = picture
 
-    def record_hits(self, scene: CompiledScene, met: MetSurfaces) -> None:
+    def record_hits(self, leg: Leg) -> None:
         """Count those of the first bounce that go on, and keep the light that was found so far."""
-        if met.bounce == 1 and self._picture is not None:
-            self.met += np.bincount(material_rows(scene, met.kept_hits, ALL), minlength=self.met.size)
+        if leg.bounce == 1 and self._picture is not None:
+            self.met += np.bincount(material_rows(leg.scene, leg.kept_hits, ALL), minlength=self.met.size)
             self.own, self._shaded = self._picture.copy(), False
 
     def record_scattering(self, paths: Paths, shade: Shading, left: Paths) -> None:

@@ -10,8 +10,6 @@ def accumulate(L: Floats, paths: Paths, contribution: Contribution) -> None:
     """Add a contribution, times the throughput of its paths, to the slots of L."""
     slot = take(paths.slot, contribution.lanes)
     arriving: Floats = take(paths.throughput, contribution.lanes) * contribution.radiance
-    if paths.recorder is not None:
-        arriving = paths.recorder.clamped(paths, contribution, slot, arriving)
+    arriving = paths.recorder.clamped(paths, contribution, slot, arriving)
     add_to_slots(L, slot, arriving)
-    if paths.recorder is not None:
-        paths.recorder.record_light(L, paths, contribution, slot, arriving)
+    paths.recorder.record_light(L, paths, contribution, slot, arriving)

@@ -6,24 +6,14 @@ from dataclasses import replace
 
 import numpy as np
 
-from ..arrays.state import BounceDepth, Paths
-from ..arrays.vec import Bools, Bytes, Floats, Ints, broadcast, dot, f4, normalize, signs, take
+from ..arrays.state import Paths
+from ..arrays.vec import Floats, Ints, dot, f4, normalize, signs, take
 from ..bsdfs import BsdfSample, sampled
 from ..sampling.sampler import Dimension, Sampler
 from .guidance import mix_with_guide
 from .interaction import LIFT, offset_origin
 from .normal_mapping import folded_onto, mirrored_at_surface
 from .shade import Shading, evaluate_unfolded
-
-# (3, 2) the depth after a scattering, by the depth before it and by whether it is specular
-DEPTH_AFTER = np.array(
-    [
-        [BounceDepth.DIRECT, BounceDepth.CAMERA],
-        [BounceDepth.INDIRECT, BounceDepth.INDIRECT],
-        [BounceDepth.INDIRECT, BounceDepth.INDIRECT],
-    ],
-    np.uint8,
-)
 
 
 def branch(paths: Paths, shade: Shading, sampler: Sampler, bounce: int, ways: int) -> Paths:
@@ -35,8 +25,7 @@ def branch(paths: Paths, shade: Shading, sampler: Sampler, bounce: int, ways: in
         return bounce_sample(paths, shade, sampler, bounce)
     paths = Paths.concatenate([bounce_sample(each, shade, sampler, bounce) for each in copies(paths, ways)])
     paths.throughput *= f4(1 / ways)
-    if paths.recorder is not None:
-        paths.recorder.branched(ways)
+    paths.recorder.branched(ways)
     return paths
 
 
@@ -95,13 +84,12 @@ def bounce_sample(paths: Paths, shade: Shading, sampler: Sampler, bounce: int) -
         light_traced=paths.light_traced
         if bounce or paths.light_traced is None
         else paths.light_traced & ~specular,
-        depth=None if paths.depth is None else _after(paths.depth, specular),
+        depth=paths.depth,
         met_rough=paths.met_rough,
         left_receiver=shade.receiver,
         recorder=paths.recorder,
     )
-    if paths.recorder is not None:
-        paths.recorder.record_scattering(paths, shade, left)
+    paths.recorder.record_scattering(paths, shade, left)
     return left
 
 
@@ -125,14 +113,6 @@ def _folded(shade: Shading, sample: BsdfSample, direction: Floats) -> tuple[Bsdf
         weight[:, twice] = (weight.take(twice, 1) * one + f * np.abs(other[2])) / both
         pdf[twice] = both
     return replace(sample, wi=wi, weight=weight, pdf=pdf), direction
-
-
-def _after(depth: Bytes, specular: Bools) -> Bytes:
-    """Return `Paths.depth` (n,) after another scattering, which is specular (n,) or not."""
-    n = depth.size
-    if n and not (depth.strides[0] or specular.strides[0]):  # alike on all lanes
-        return broadcast(_after(depth[:1].copy(), specular[:1].copy())[0], n)
-    return DEPTH_AFTER[depth, specular.view(np.uint8)]
 
 
 def _strayed(shade: Shading, wi: Floats, cos: Floats) -> Ints:

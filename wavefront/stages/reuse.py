@@ -116,7 +116,7 @@ def as_shared(paths: Paths, columns: int | None = None) -> Paths:
         roulette_scale=paths.roulette_scale * highest(paths.throughput),
         depth=None,
         met_rough=None,
-        recorder=None if paths.recorder is None else paths.recorder.of_shared(columns or n),
+        recorder=paths.recorder.of_shared(columns or n),
     )
 
 

@@ -302,7 +302,7 @@ def direct(
             pdf = shade.guidance.mixed(lanes, take(light.wi, lanes), pdf)
         scale *= scene.lights.mis_weight(number, pdf_light, pdf)
     arriving = f.take(lanes, 1) * radiance * scale
-    directed = directed or (paths.recorder is not None and paths.recorder.needs_directions)
+    directed = directed or paths.recorder.needs_directions
     toward = take(light.wi, lanes) if directed else None
     return Contribution(lanes, arriving, number, sampled=True, wi=toward)
 
