@@ -12,10 +12,10 @@ from wavefront.arrays.vec import broadcast
 from wavefront.bsdfs import BsdfSample
 from wavefront.bsdfs.base import weigh
 from wavefront.compile.materials import group_materials
-from wavefront.stages.bounce import _folded, _sample
+from wavefront.features.normal_maps import MappedShading, _folded
+from wavefront.stages.bounce import _sample
 from wavefront.stages.interaction import origin_above
 from wavefront.stages.normal_mapping import ensure_valid_reflection
-from wavefront.stages.shade import Shading, evaluate
 from wavefront.testing.bsdf import _surface
 
 F4 = np.float32
@@ -47,11 +47,11 @@ class Tilted(wf.Bsdf):
         materials = group_materials([wf.Material(self.inner)])
         groups = [(slice(0, n), materials.groups[0].bind(surface))]
         at = frame.to_local(wo)
-        return Shading(surface, frame, at, origin_above(surface), groups, materials=materials)
+        return MappedShading(surface, frame, at, origin_above(surface), groups, materials=materials)
 
     def evaluate(self, wo, wi):
         shade = self.shading(wo)
-        f, pdf = evaluate(shade, shade.frame.to_local(wi))
+        f, pdf = shade.evaluate(shade.frame.to_local(wi))
         cos, _ = shade.cosines(shade.frame.to_local(wi), wi)
         height = np.where(wi[2] == 0, F4(1), np.abs(wi[2]))
         return f * cos / height, np.where(cos > 0, pdf, F4(0))

@@ -21,7 +21,6 @@ from ..materials import Material
 from ..shapes import Instance, Mesh, Shape
 from ..stages.generate import center_rays
 from ..stages.interaction import interaction
-from ..stages.normal_mapping import perturb_normals
 from ..stages.passing import covering_hits
 
 RAYS_AT_ONCE = 1 << 16
@@ -162,7 +161,8 @@ def _found(
         yield "uv", uv
     if any(name in names for name in NORMALS):
         surface = interaction(scene, moved, hits)
-        perturb_normals(scene, surface)
+        for tilt in scene.program.tilt:
+            tilt(scene, moved, surface)
         if "normal" in names:
             yield "normal", surface.ns.T
         if "normal_geometric" in names:

@@ -24,7 +24,6 @@ from ..film.aov_names import AOVS, CLAMPED, KEYED_AOVS, LUX, NARROW
 from ..film.aov_samples import BOUNDED, AovSamples, FixedPointSamples, fixed_point
 from ..stages.compact import compact
 from ..stages.interaction import interaction
-from ..stages.normal_mapping import perturb_normals
 from ..stages.shade import Shading, shading
 from .lux import lux_of
 from .narrow_lobes import NarrowLobes
@@ -185,7 +184,8 @@ class SampleRecorder(PathRecorder):
             return
         scene, paths, hits = self._awaited.scene, self._awaited.paths, self._awaited.hits
         surface = interaction(scene, paths, hits)
-        perturb_normals(scene, surface)
+        for tilt in scene.program.tilt:
+            tilt(scene, paths, surface)
         self.record_surfaces(scene, paths, shading(scene, surface))
 
     def _record_features(self, paths: Paths, lanes: Ints, shade: Shading, albedo: Floats) -> None:

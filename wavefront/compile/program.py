@@ -82,6 +82,8 @@ class Feature:
         Its opacities draw random numbers, so that only paths meet them.
     dims_shadows
         Its surfaces let a part of the light of shadow rays through.
+    shading
+        A subclass of `stages.shade.Shading` whose methods act where surfaces are shaded; None for none.
     compared
         Two renders must have it in common so that one can go on from the checkpoint of the other. False where
         it follows from settings, which are compared by themselves.
@@ -92,6 +94,7 @@ class Feature:
     drawn: ClassVar[bool] = False
     dims_shadows: ClassVar[bool] = False
     compared: ClassVar[bool] = True
+    shading: ClassVar[Any] = None
 
     @classmethod
     def of(cls, facts: Facts) -> Self | None:
@@ -135,6 +138,9 @@ class Feature:
         `end` (n,) says which rays end there.
         """
 
+    def tilt(self, scene: CompiledScene, rays: Rays, surface: SurfaceInteraction) -> None:
+        """Change, in place, surfaces that rays have hit, before they are shaded."""
+
     def weaken(self, throughput: Floats, hits: Hits, surface: SurfaceInteraction) -> None:
         """Weaken, in place, the throughput (3, n) of rays that have come to surfaces."""
 
@@ -163,8 +169,10 @@ class Program:
 
     Attributes
     ----------
-    begin, walk, cross, dim, weaken
+    begin, walk, cross, dim, tilt, weaken
         What acts at these points.
+    shading
+        What surfaces are when they are shaded, the outermost kind first.
     see_through
         What shadow rays may pass.
     seen_through
@@ -179,9 +187,10 @@ class Program:
         self.features = tuple(features)
         everywhere = [each for each in features if not each.camera_only]
         self._camera, self._later = LegProgram(self.features), LegProgram(everywhere)
-        self.begin, self.walk, self.cross, self.dim, self.weaken = (
-            _at(self.features, point) for point in ("begin", "walk", "cross", "dim", "weaken")
+        self.begin, self.walk, self.cross, self.dim, self.tilt, self.weaken = (
+            _at(self.features, point) for point in ("begin", "walk", "cross", "dim", "tilt", "weaken")
         )
+        self.shading = tuple(each.shading for each in reversed(self.features) if each.shading is not None)
         self.see_through = self._later.see_through
         self.seen_through = tuple(each for each in self._camera.see_through if not each.drawn)
         self.unseen = tuple(each for each in self._camera.see_through if each.camera_only)

@@ -14,8 +14,10 @@ from ..scene import Scene
 from .absorption import Absorption
 from .alpha import Alpha
 from .background import Backdrop, Background
+from .caustics import Caustics
 from .media import Glow, Media
 from .nested import Nested
+from .normal_maps import NormalMaps
 from .passing import Passing
 from .shadow_catchers import ShadowCatchers
 from .unseen import Unseen
@@ -26,10 +28,12 @@ FEATURES: tuple[type[Feature], ...] = (
     Nested,
     Unseen,
     ShadowCatchers,
+    NormalMaps,
     Absorption,
     Media,
     Passing,
     Glow,
+    Caustics,
     Backdrop,
     Background,
 )

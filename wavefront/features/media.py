@@ -8,19 +8,67 @@ from typing import Self
 import numpy as np
 
 from ..arrays.soa import soa
-from ..arrays.state import Contribution, Paths
+from ..arrays.state import Contribution, Paths, Rays, SurfaceInteraction
 from ..arrays.vec import Bools, Floats, Ints, highest, take
+from ..compile.media import stacks_leaving
 from ..compile.program import Facts, Feature, Leg, Passage
 from ..compile.scene import CompiledScene
+from ..sampling.sampler import Sampler
 from ..stages.accumulate import accumulate
 from ..stages.inside import stacks_at
 from ..stages.intersect import ShadowRays
-from ..stages.medium import cross, dim, fly
+from ..stages.medium import begin_in_media, cross, crossings, dim, fly
+from ..stages.shade import Shading
+
+
+class ShadingInMedia(Shading):
+    """Surfaces and points within media: where there is no surface there is no cosine."""
+
+    __slots__ = ()
+
+    def prepare(self, scene: CompiledScene) -> None:
+        """Find the points within media, and what crossing the surfaces does to stacks."""
+        super().prepare(scene)
+        self.volume = np.flatnonzero(self.surface.prim < 0)
+        self.crossing = crossings(scene, self.surface)
+
+    def cosines(self, local: Floats, world: Floats) -> tuple[Floats, Floats]:
+        """Return the cosines, 1 within media."""
+        cos, cos_g = super().cosines(local, world)
+        if self.volume is not None and self.volume.size:
+            cos_g = cos_g.copy()
+            cos[self.volume] = cos_g[self.volume] = 1
+        return cos, cos_g
+
+    def enter(
+        self,
+        scene: CompiledScene,
+        rays: ShadowRays,
+        paths: Paths,
+        lanes: Ints,
+        light: Ints,
+        cos_g: Floats,
+        sampler: Sampler,
+        bounce: int,
+    ) -> None:
+        """Note what shadow rays begin inside of."""
+        stack = paths.media[:, : cos_g.size]
+        if self.crossing is not None:
+            stack = stacks_leaving(stack, self.crossing, cos_g)
+        begin_in_media(scene, rays, paths, stack, lanes, light, sampler, bounce)
+
+    def leave(self, paths: Paths, left: Paths, cos_g: Floats, bounce: int) -> None:
+        """Note what paths have entered and left."""
+        super().leave(paths, left, cos_g, bounce)
+        if self.crossing is not None:
+            left.media = stacks_leaving(paths.media, self.crossing, cos_g)
 
 
 @soa
 class Media(Feature):
     """Scatters and weakens rays within media, and notes what they are inside of."""
+
+    shading = ShadingInMedia
 
     @classmethod
     def of(cls, facts: Facts) -> Self | None:
@@ -42,6 +90,11 @@ class Media(Feature):
     def cross(self, passage: Passage) -> None:
         """Note what rays are inside of behind surfaces."""
         passage.rays.media = cross(passage.scene, passage.rays.media, passage.surface)
+
+    def tilt(self, scene: CompiledScene, rays: Rays, surface: SurfaceInteraction) -> None:
+        """Find the index of refraction that is around surfaces."""
+        assert scene.media is not None
+        surface.index_around = scene.media.index_around(rays.media, surface)
 
 
 @soa

@@ -18,10 +18,10 @@ from ..compile.scene import CompiledScene
 from ..lights import LightSample, Receiver
 from ..sampling.mis import power_heuristic
 from ..sampling.sampler import Dimension, Sampler
-from ..sampling.steps import StepNumbers
 from ..sampling.warp import cosine_hemisphere
 from ..stages.interaction import material_rows, origin_above
-from ..stages.intersect import ShadowRays, shadow_rays, visible
+from ..stages.intersect import shadow_rays, visible
+from ..stages.medium import begin_in_media
 from ..stages.transmittance import transmittance_along
 
 CANDIDATES = 8  # of light samples, and again of directions, at each point
@@ -84,27 +84,15 @@ def shadow_opacity(
     lit = np.flatnonzero(total > 0)
     sample = LightSample(wi, np.zeros_like(wi), np.ones(n, f4), distance, cos_light)
     rays = shadow_rays(surface, start, sample, lit)
-    _enter_media(scene, paths, sampler, rays, lit, which)
+    if scene.media is not None:
+        number_of = take(which, lit)
+        begin_in_media(scene, rays, paths, paths.media, lit, number_of, sampler, FIRST_VERTEX)
     opacity = np.zeros(n, f4)
     if scene.program.dims_shadows:
         opacity[lit] = f4(1) - luminance(transmittance_along(scene, rays))
     else:
         opacity[lit] = ~visible(scene, rays)
     return opacity
-
-
-def _enter_media(
-    scene: CompiledScene, paths: Paths, sampler: Sampler, rays: ShadowRays, lanes: Ints, number: Ints
-) -> None:
-    """Let rays (k,) of some lanes begin in the media of their paths; `number` (n,) is of the lights."""
-    if scene.media is None or paths.media is None:
-        return
-    rays.media = take(paths.media, lanes)
-    if (scene.media.light_of >= 0).any():
-        rays.goal = scene.media.holding(take(number, lanes), len(scene.lights))
-    if scene.media.takes_steps:
-        address = take(paths.pixel, lanes), take(paths.sample, lanes), FIRST_VERTEX
-        rays.steps = StepNumbers.of(sampler.seed, *address, Dimension.TRANSMITTANCE)
 
 
 def _candidates(

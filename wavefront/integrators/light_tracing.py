@@ -39,9 +39,8 @@ from ..stages.compact import compact, roulette, select
 from ..stages.inside import stacks_at
 from ..stages.interaction import interaction, offset_origin, origin_above
 from ..stages.intersect import ShadowRays, intersect, shadow_rays, visible
-from ..stages.normal_mapping import perturb_normals
 from ..stages.passing import pass_through
-from ..stages.shade import Shading, evaluate, radiance_at_samples, shading
+from ..stages.shade import Shading, radiance_at_samples, shading
 from ..stages.transmittance import Veils, opacities_at, transmittance_along
 
 NEARBY = f4(16)  # error bounds within which another surface is at the same place
@@ -79,7 +78,7 @@ def trace_light(
     paths, hits, flux = _begin(scene, scene.specular_surfaces, camera, sampler, pixel, sample)
     found = []
     for bounce in range(max_bounces - 1):
-        shade = _prepared(scene, paths, hits, paths.media)
+        shade = _prepared(scene, paths, hits)
         if bounce:
             found.append(_connect(scene, camera, sampler, paths, hits, shade, flux, bounce))
         paths = _scatter(scene, paths, hits, shade, sampler, bounce)
@@ -95,7 +94,7 @@ def trace_light(
         if not len(paths):
             break
     else:
-        shade = _prepared(scene, paths, hits, paths.media)
+        shade = _prepared(scene, paths, hits)
         found.append(_connect(scene, camera, sampler, paths, hits, shade, flux, max_bounces - 1))
     return Splats.concatenate([_nothing(), *found])
 
@@ -206,12 +205,11 @@ def _transmittance(scene: CompiledScene, rays: ShadowRays, veils: Veils = ()) ->
     return visible(scene, rays).astype(f4)
 
 
-def _prepared(scene: CompiledScene, rays: Rays, hits: Hits, stack: Any) -> Shading:
-    """Return the surfaces that rays with stacks (4, n) hit, ready to shade."""
+def _prepared(scene: CompiledScene, rays: Rays, hits: Hits) -> Shading:
+    """Return the surfaces that rays hit, ready to shade."""
     surface = interaction(scene, rays, hits)
-    if scene.media is not None:
-        surface.index_around = scene.media.index_around(stack, surface)
-    perturb_normals(scene, surface)
+    for tilt in scene.program.tilt:
+        tilt(scene, rays, surface)
     return shading(scene, surface)
 
 
@@ -282,11 +280,11 @@ def _towards(scene: CompiledScene, hits: Hits, point: Floats, wo: Floats, wi: Fl
     and that of wi with the shading normal over that with the geometric one, as the flux that arrives has the
     latter.
     """
-    rays = Rays(point, -wo, broadcast(np.intp(-1), wo.shape[1]))
-    shade = _prepared(scene, rays, replace(hits, t=np.zeros_like(hits.t)), stack)
+    rays = Rays(point, -wo, broadcast(np.intp(-1), wo.shape[1]), media=stack)
+    shade = _prepared(scene, rays, replace(hits, t=np.zeros_like(hits.t)))
     local = shade.frame.to_local(wi)
     cos, cos_g = shade.cosines(local, wi)
-    f, _ = evaluate(shade, local)
+    f, _ = shade.evaluate(local)
     return f * (_divided(cos, np.abs(cos_g)) * np.abs(dot(shade.surface.ng, wo)))
 
 

@@ -16,9 +16,8 @@ from ..stages.compact import compact, roulette, scattering_lanes, select
 from ..stages.guidance import guide
 from ..stages.interaction import interaction
 from ..stages.intersect import intersect
-from ..stages.normal_mapping import perturb_normals
 from ..stages.sensors import at_sensors, sensor_shading
-from ..stages.shade import Shading, direct, emitted, mis_weighted, shading, without_caustics
+from ..stages.shade import Shading, direct, emitted, mis_weighted, shading
 
 
 def intersect_and_compact(
@@ -42,7 +41,6 @@ def intersect_and_compact(
     for fly in acts.fly:
         fly(leg)
     leg.emission = emitted(scene, leg.paths, leg.hits)
-    leg.emission = without_caustics(scene, leg.paths, leg.left, leg.hits, leg.emission)
     leg.lanes = keep(scene, leg.paths, leg.hits, leg.emission)
     for meet in acts.meet:
         meet(leg)
@@ -57,7 +55,8 @@ def prepare_shading(scene: CompiledScene, paths: Paths, hits: Hits) -> Shading:
     if paths.sensor is not None:
         return sensor_shading(scene, paths)
     surface = interaction(scene, paths, hits)
-    perturb_normals(scene, surface)
+    for tilt in scene.program.tilt:
+        tilt(scene, paths, surface)
     for weaken in scene.program.weaken:
         weaken(paths.throughput, hits, surface)
     shade = shading(scene, surface)

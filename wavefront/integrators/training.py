@@ -20,7 +20,7 @@ from ..guiding.octahedral import bins_of
 from ..guiding.training import LEVELS, SIDE, Records, build_table, learn_shares
 from ..sampling.sampler import Sampler
 from ..stages.generate import generate
-from ..stages.shade import Shading, evaluate
+from ..stages.shade import Shading
 from .ladder import li_full
 
 PATHS = 1 << 18
@@ -123,7 +123,7 @@ def _vertices(L: Floats, paths: Paths, left: Paths, shade: Shading) -> Vertices:
     n = len(lit.surface) if lit.groups else 0
     lanes = np.flatnonzero(~left.specular[:n] & (highest(left.throughput)[:n] > 0))
     local = shade.frame.to_local(left.direction)
-    pdf_bsdf = evaluate(lit, local[:, :n])[1] if n else local[2, :0]
+    pdf_bsdf = lit.evaluate(local[:, :n])[1] if n else local[2, :0]
     slot = take(left.slot, lanes)
     return Vertices(
         slot=slot,

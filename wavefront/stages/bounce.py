@@ -7,13 +7,11 @@ from dataclasses import replace
 import numpy as np
 
 from ..arrays.state import Paths
-from ..arrays.vec import Floats, Ints, dot, f4, normalize, signs, take
+from ..arrays.vec import Floats, Ints, f4, normalize, signs, take
 from ..bsdfs import BsdfSample, sampled
 from ..sampling.sampler import Dimension, Sampler
-from .guidance import mix_with_guide
 from .interaction import LIFT, offset_origin
-from .normal_mapping import folded_onto, mirrored_at_surface
-from .shade import Shading, evaluate_unfolded
+from .shade import Shading
 
 
 def branch(paths: Paths, shade: Shading, sampler: Sampler, bounce: int, ways: int) -> Paths:
@@ -48,13 +46,7 @@ def bounce_sample(paths: Paths, shade: Shading, sampler: Sampler, bounce: int) -
     """
     surface = shade.surface
     sample = _sample(shade, _numbers(paths, shade, sampler, bounce))
-    direction = shade.frame.to_world(sample.wi)
-    roulette_scale = paths.roulette_scale if sample.eta is None else paths.roulette_scale * sample.eta**2
-    if surface.folds is not None:
-        sample, direction = _folded(shade, sample, direction)
-    if shade.guidance is not None:
-        sample, direction, gain = mix_with_guide(shade, paths, sample, direction, sampler, bounce)
-        roulette_scale = roulette_scale * gain
+    sample, direction, roulette_scale = shade.aim(paths, sample, sampler, bounce)
     cos, cos_g = shade.cosines(sample.wi, direction)
     specular = sample.specular
     turned = _strayed(shade, sample.wi, cos)
@@ -64,8 +56,6 @@ def bounce_sample(paths: Paths, shade: Shading, sampler: Sampler, bounce: int) -
         specular = specular.copy()
         specular[turned] = True  # light sampling cannot find these directions
     throughput = paths.throughput * sample.weight
-    if surface.unmapped is not None:
-        throughput *= shade.unshadowed(direction)
     if not (cos > 0).all():
         lost = np.flatnonzero(~(cos > 0))
         throughput[:, lost] *= f4(0) * cos.take(lost)  # NaN stays, so that it reaches the picture
@@ -80,39 +70,16 @@ def bounce_sample(paths: Paths, shade: Shading, sampler: Sampler, bounce: int) -
         pdf=sample.pdf,
         specular=specular,
         roulette_scale=roulette_scale,
-        media=shade.stacks(paths.media, cos_g),
-        light_traced=paths.light_traced
-        if bounce or paths.light_traced is None
-        else paths.light_traced & ~specular,
+        media=paths.media,
+        light_traced=paths.light_traced,
         depth=paths.depth,
         met_rough=paths.met_rough,
         left_receiver=shade.receiver,
         recorder=paths.recorder,
     )
+    shade.leave(paths, left, cos_g, bounce)
     paths.recorder.record_scattering(paths, shade, left)
     return left
-
-
-def _folded(shade: Shading, sample: BsdfSample, direction: Floats) -> tuple[BsdfSample, Floats]:
-    """Return samples and world directions (3, n), those folded that lead to the wrong side of `ng`."""
-    surface = shade.surface
-    assert surface.folds is not None
-    wi, weight, pdf = sample.wi.copy(), sample.weight.copy(), sample.pdf.copy()
-    wrong = surface.folds & (wi[2] * dot(surface.ng, direction) < 0)
-    lanes = np.flatnonzero(wrong)
-    direction[:, lanes] = mirrored_at_surface(surface.ng.take(lanes, 1), direction.take(lanes, 1))
-    wi[:, lanes] = shade.frame.take(lanes).to_local(direction.take(lanes, 1))
-    twice, image = folded_onto(surface, shade.frame, wi)
-    some = np.flatnonzero(~take(sample.specular, twice) & (pdf.take(twice) > 0))
-    if some.size:
-        twice = twice.take(some)
-        # the direction that could have been drawn, too
-        other = np.where(wrong.take(twice), wi.take(twice, 1), image.take(some, 1))
-        f, more = evaluate_unfolded(shade.at(twice), other)
-        one, both = pdf.take(twice), pdf.take(twice) + more
-        weight[:, twice] = (weight.take(twice, 1) * one + f * np.abs(other[2])) / both
-        pdf[twice] = both
-    return replace(sample, wi=wi, weight=weight, pdf=pdf), direction
 
 
 def _strayed(shade: Shading, wi: Floats, cos: Floats) -> Ints:

@@ -43,7 +43,6 @@ def generate(
         pdf=broadcast(f4(1), n),
         specular=broadcast(np.True_, n),
         roulette_scale=broadcast(f4(1) if sensor is None else f4(1) / sensor.total, n),
-        light_traced=None if scene.specular_surfaces is None else broadcast(np.True_, n),
         sensor=sensor,
     )
     for begin in scene.program.begin:

@@ -24,7 +24,7 @@ from ..arrays.vec import ALL, Bools, Floats, Ints, f4, take
 from ..bsdfs import Bsdf
 from ..compile.scene import CompiledScene
 from ..sampling.sampler import Sampler
-from .shade import Shading, direct, evaluate
+from .shade import Shading, direct
 
 SECTIONS = 3  # columns for each point: light of samples, what stays its own, light along next directions
 
@@ -94,7 +94,7 @@ class GlossyPoints:
 
 def _evaluated(shade: Shading, world: Floats) -> tuple[Floats, Floats]:
     """Return f (3, k), without the cosine, and the density (k,) of world directions (3, k)."""
-    f, pdf = evaluate(shade, shade.frame.to_local(world))
+    f, pdf = shade.evaluate(shade.frame.to_local(world))
     return f, pdf if shade.guidance is None else shade.guidance.mixed(ALL, world, pdf)
 
 

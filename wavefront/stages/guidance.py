@@ -16,7 +16,7 @@ from ..arrays.vec import Floats, Ints, f4, take
 from ..bsdfs import BsdfSample
 from ..guiding import GuideTable
 from ..sampling.sampler import Dimension, Sampler
-from .shade import Guidance, Shading, evaluate
+from .shade import Guidance, Shading
 
 LEAST_PDF_RATIO = f4(1e-3)  # least density of the BSDF, relative to that of the mixture, for roulette
 
@@ -70,7 +70,7 @@ def mix_with_guide(
     wi, specular, valid = sample.wi.copy(), np.array(sample.specular), sample.pdf > 0
     wi[:, chosen] = shade.frame.take(chosen).to_local(take(direction, chosen))
     specular[chosen], valid[chosen] = False, True
-    f, pdf_bsdf = evaluate(shade.lit(), wi[:, :n])
+    f, pdf_bsdf = shade.lit().evaluate(wi[:, :n])
     pdf = shade.guidance.mixed(slice(0, n), direction[:, :n], pdf_bsdf)
     weight, density, gain = sample.weight.copy(), sample.pdf.copy(), np.ones(len(paths), f4)
     good = valid[:n] & (pdf > 0)

@@ -39,8 +39,6 @@ def interaction(scene: CompiledScene, rays: Rays, hits: Hits) -> SurfaceInteract
     if scene.media is None:
         return _on_surfaces(scene, rays, hits)
     surface = _on_surfaces(scene, rays, replace(hits, prim=np.maximum(hits.prim, 0)))
-    if isinstance(rays, Paths) and rays.media is not None:
-        surface.index_around = scene.media.index_around(rays.media, surface)
     lanes = np.flatnonzero(hits.prim < 0)
     if lanes.size:
         wo = take(surface.wo, lanes)

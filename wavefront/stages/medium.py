@@ -14,7 +14,7 @@ from ..compile.program import Leg
 from ..compile.scene import CompiledScene
 from ..compile.touching import TouchingFaces
 from ..media.base import GlowWeights, MediumRays
-from ..sampling.sampler import Dimension
+from ..sampling.sampler import Dimension, Sampler
 from ..sampling.steps import StepNumbers
 from .intersect import ShadowRays
 
@@ -80,6 +80,35 @@ def _glow_weights(scene: CompiledScene, paths: Paths, lanes: Ints, medium: Ints)
     ratio = np.zeros(lanes.size, f4)
     ratio[sampled] = chance / np.maximum(take(paths.pdf, at), TINY)
     return GlowWeights(ratio, dot(origin - take(start, lanes), take(paths.direction, lanes)))
+
+
+def begin_in_media(
+    scene: CompiledScene,
+    rays: ShadowRays,
+    paths: Paths,
+    stack: Any,
+    lanes: Ints,
+    light: Ints,
+    sampler: Sampler,
+    bounce: int,
+) -> None:
+    """Give shadow rays (k) of some lanes of paths what they need in media.
+
+    Parameters
+    ----------
+    stack
+        (4, n) what rays of all lanes are inside of.
+    light
+        (k,) numbers of the lights that they lead to.
+    """
+    media = scene.media
+    assert media is not None
+    rays.media = take(stack, lanes)
+    if (media.light_of >= 0).any():
+        rays.goal = media.holding(light, len(scene.lights))
+    if media.takes_steps:
+        address = take(paths.pixel, lanes), take(paths.sample, lanes), bounce
+        rays.steps = StepNumbers.of(sampler.seed, *address, Dimension.TRANSMITTANCE)
 
 
 def dim(part: Floats, scene: CompiledScene, rays: ShadowRays, length: Floats, end: Bools) -> None:

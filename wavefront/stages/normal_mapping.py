@@ -16,7 +16,7 @@ import numpy as np
 
 from ..arrays.frame import Frame
 from ..arrays.state import SurfaceInteraction
-from ..arrays.vec import Floats, Ints, dot, f4, normalize, take
+from ..arrays.vec import TINY, Floats, Ints, dot, f4, normalize, take
 from ..compile.scene import CompiledScene
 from .interaction import LIFT, face_viewer
 
@@ -26,8 +26,6 @@ SHALLOWER = f4(0.9)  # reflected directions are raised to at most this part of w
 def perturb_normals(scene: CompiledScene, surface: SurfaceInteraction) -> None:
     """Apply, in place, the normal maps and bump maps of materials to the shading normals."""
     materials = scene.materials
-    if not materials.normal_maps:
-        return
     if any(normal_map.shadows_grazing for normal_map in materials.normal_maps):
         surface.unmapped = surface.ns
     surface.ns = surface.ns.copy()  # it may be ng itself
@@ -106,3 +104,21 @@ def folded_onto(surface: SurfaceInteraction, frame: Frame, wi: Floats) -> tuple[
     other, side = mirrored_at_surface(ng, wi), dot(ng, wi)
     lanes = np.flatnonzero(surface.folds & (wi[2] * side > 0) & (other[2] * side > 0))
     return lanes, take(other, lanes)
+
+
+def unshadowed(surface: SurfaceInteraction, world: Floats) -> Floats:
+    """Return the part (n,) of light along world directions (3, n) that tilted normals do not shadow.
+
+    It is the shadowing of GGX facets with α² = tan²θ/8, at most 1, of normals tilted by θ.
+
+    Source: A. Conty Estevez, P. Lecocq and C. Stein, "A Microfacet-Based Shadowing Function to Solve the Bump
+    Terminator Problem", Ray Tracing Gems, 2019, chapter 12, with the constants of Mitsuba 3.
+    """
+    assert surface.unmapped is not None
+    alpha2 = np.minimum(f4(0.125) * _squared_tangent(dot(surface.unmapped, surface.ns)), f4(1))
+    return f4(2) / (f4(1) + np.sqrt(f4(1) + alpha2 * _squared_tangent(dot(surface.unmapped, world))))
+
+
+def _squared_tangent(cos: Floats) -> Floats:
+    cos2 = cos * cos
+    return np.maximum(f4(1) - cos2, f4(0)) / np.maximum(cos2, TINY)

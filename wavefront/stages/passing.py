@@ -121,4 +121,4 @@ def covering_hits(scene: CompiledScene, rays: Rays) -> tuple[Rays, Hits]:
         rays.put(lanes, passage.rays)
         hits.put(lanes, intersect(scene, passage.rays))
         lanes = lanes.compress(passable(scene, rays, hits, lanes, veils))
-    return replace(rays, media=None), hits
+    return rays, hits

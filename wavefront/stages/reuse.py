@@ -46,7 +46,7 @@ from ..sampling.tiles import MEMBERS, WaveTiles
 from .glossy_points import SECTIONS, GlossyPoints, glossy_materials
 from .interaction import interaction, material_rows, offset_origin
 from .intersect import ShadowRays, visible
-from .shade import Guidance, Shading, evaluate
+from .shade import Guidance, Shading
 from .transmittance import transmittance_along
 
 SHARED_WAYS = 2  # in which a path goes on from its shared point: many pixels use what it finds
@@ -347,7 +347,7 @@ class FirstPoints:
         """
         if self.shade is not None:
             local = self.shade.frame.to_local(wi)
-            f, pdf = evaluate(self.shade, local)
+            f, pdf = self.shade.evaluate(local)
             return f * self.shade.cosines(local, wi)[0], pdf
         pdf = positive(dot(self.normal, wi)) * INV_PI
         f = pdf if self.ng is None else pdf * (dot(self.ng, wi) > 0)

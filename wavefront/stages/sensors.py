@@ -21,7 +21,7 @@ from ..camera import Camera
 from ..compile.scene import CompiledScene
 from ..sampling.warp import cosine_hemisphere, cosine_hemisphere_pdf, uniform_sphere, uniform_sphere_pdf
 from .interaction import POINT_ERROR, origin_above
-from .shade import Shading, receiver_of
+from .shade import Shading, receiver_of, shading_kind
 
 Warp: TypeAlias = Callable[[Floats], Floats]
 UP = column((0, 0, 1))
@@ -95,9 +95,15 @@ class SensorShading(Shading):
         groups: list[tuple[Lanes, Bsdf]] = [(slice(0, lanes.size), self.groups[0][1])]
         volume = None if self.volume is None else np.arange(lanes.size)
         up, start = np.broadcast_to(UP, (3, lanes.size)), take(self.start, lanes)
-        return SensorShading(
+        return type(self)(
             surface, self.frame.take(lanes), up, start, groups, self.guidance_at(lanes), volume=volume
         )
+
+    def cosines(self, local: Floats, world: Floats) -> tuple[Floats, Floats]:
+        """Return the cosines of directions, 1 where all directions count alike."""
+        if self.volume is None:
+            return super().cosines(local, world)
+        return np.ones_like(local[2]), np.ones_like(local[2])
 
     def albedo(self) -> Floats:
         """Return by what cosine over π is multiplied, (3, n)."""
@@ -122,6 +128,6 @@ def sensor_shading(scene: CompiledScene, paths: Paths) -> Shading:
     groups: list[tuple[Lanes, Bsdf]] = [(slice(0, n), paths.sensor)]
     receiver = receiver_of(surface, groups) if scene.lights.takes_receiver else None
     up, volume = np.broadcast_to(UP, normal.shape), np.arange(n) if paths.sensor.transmissive else None
-    return SensorShading(
+    return shading_kind(SensorShading, scene.program.shading)(
         surface, surface.frame(), up, origin_above(surface), groups, receiver=receiver, volume=volume
     )

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import replace
+from functools import cache
 from typing import Any
 
 import numpy as np
@@ -11,21 +12,17 @@ import numpy as np
 from ..arrays.frame import Frame
 from ..arrays.soa import soa
 from ..arrays.state import Contribution, Hits, Paths, SurfaceInteraction
-from ..arrays.vec import ALL, TINY, Floats, Ints, Lanes, broadcast, column, dot, f4, highest, take
-from ..bsdfs import Bsdf, albedo_of, evaluated
+from ..arrays.vec import ALL, Floats, Ints, Lanes, broadcast, column, dot, f4, highest, take
+from ..bsdfs import Bsdf, BsdfSample, albedo_of, evaluated
 from ..compile.materials import MaterialTable
-from ..compile.media import stacks_leaving
 from ..compile.program import Passage
 from ..compile.scene import CompiledScene
 from ..guiding import GuideTable
 from ..lights import LightSample, Receiver
 from ..sampling.mis import power_heuristic
 from ..sampling.sampler import Dimension, Sampler
-from ..sampling.steps import StepNumbers
 from .interaction import interaction, offset_origin, origin_above
 from .intersect import ShadowRays, shadow_rays, visible
-from .medium import crossings
-from .normal_mapping import folded_onto
 from .transmittance import opacities_at, transmittance_along
 
 UP = column((0, 0, 1))
@@ -72,7 +69,7 @@ class Shading:
         parts = self.surface.take(first), self.frame.take(first), self.wo[:, first], self.start[:, first]
         receiver = None if self.receiver is None else self.receiver.take(first)
         crossing = None if self.crossing is None else self.crossing[:, first]
-        return Shading(*parts, groups, self.guidance, receiver, self.volume, crossing, self.materials)
+        return type(self)(*parts, groups, self.guidance, receiver, self.volume, crossing, self.materials)
 
     def at(self, lanes: Ints) -> Shading:
         """Return the surfaces of some lanes (k,) of `lit`, in any order; a lane may occur again."""
@@ -83,7 +80,7 @@ class Shading:
         receiver = None if self.receiver is None else self.receiver.take(lanes)
         assert self.materials is not None
         groups = list(_groups_anywhere(self.materials, surface))
-        return Shading(*parts, groups, self.guidance_at(lanes), receiver, materials=self.materials)
+        return type(self)(*parts, groups, self.guidance_at(lanes), receiver, materials=self.materials)
 
     def guidance_at(self, lanes: Ints) -> Guidance | None:
         """Return what guides some lanes (k,) of `lit`; None where nothing does."""
@@ -104,43 +101,70 @@ class Shading:
         """Return |cosθ| (n,) of directions, known in both frames, and their cosine against `ng`, (n,).
 
         Where the two normals disagree on the side of a direction the first is 0, so that no light leaks
-        through. It is less by what tilted normals shadow. Within media both are 1.
+        through. Within media both are 1.
         """
         if self.surface.ns is self.surface.ng:
             cos, cos_g = np.abs(local[2]), local[2]
         else:
             cos_g = dot(self.surface.ng, world)
             cos = np.abs(local[2]) * (local[2] * cos_g > 0)
-            if self.surface.unmapped is not None:
-                cos = cos * self.unshadowed(world)
-        if self.volume is not None and self.volume.size:
-            cos_g = cos_g.copy()
-            cos[self.volume] = cos_g[self.volume] = 1
         return cos, cos_g
 
-    def stacks(self, media: Any, cos_g: Floats) -> Any:
-        """Return the stacks (4, n) of rays that leave, given those of paths that come; see `cosines`."""
-        if media is None or self.crossing is None:
-            return media
-        return stacks_leaving(media, self.crossing, cos_g)
+    def evaluate(self, wi: Floats) -> tuple[Floats, Floats]:
+        """Return f (3, n), without the cosine, and the pdf (n,) of local directions wi (3, n)."""
+        return self.evaluate_unfolded(wi)
 
-    def unshadowed(self, world: Floats) -> Floats:
-        """Return the part (n,) of light along world directions (3, n) that tilted normals do not shadow.
+    def evaluate_unfolded(self, wi: Floats) -> tuple[Floats, Floats]:
+        """Return f (3, n) and the pdf (n,) as they are before directions are folded."""
+        if len(self.groups) == 1:
+            return evaluated(self.groups[0][1], self.wo, wi)
+        n = wi.shape[1]
+        f, pdf = np.empty((3, n), f4), np.empty(n, f4)
+        for lanes, bsdf in self.groups:
+            part_f, part_pdf = evaluated(bsdf, take(self.wo, lanes), take(wi, lanes))
+            f[:, lanes], pdf[lanes] = part_f, part_pdf
+        return f, pdf
 
-        It is the shadowing of GGX facets with α² = tan²θ/8, at most 1, of normals tilted by θ.
+    # --- What features change -------------------------------------------------------------------------
 
-        Source: A. Conty Estevez, P. Lecocq and C. Stein, "A Microfacet-Based Shadowing Function to Solve the
-        Bump Terminator Problem", Ray Tracing Gems, 2019, chapter 12, with the constants of Mitsuba 3.
+    def prepare(self, scene: CompiledScene) -> None:
+        """Get ready to be shaded."""
+
+    def density(self, lanes: Ints, world: Floats, pdf: Floats) -> Floats:
+        """Return the densities (k,) with which paths take world directions, given those of the BSDFs.
+
+        `world` (3, n) are directions of all lanes of `lit`, of which `lanes` (k,) are looked at.
         """
-        surface = self.surface
-        assert surface.unmapped is not None
-        alpha2 = np.minimum(f4(0.125) * _squared_tangent(dot(surface.unmapped, surface.ns)), f4(1))
-        return f4(2) / (f4(1) + np.sqrt(f4(1) + alpha2 * _squared_tangent(dot(surface.unmapped, world))))
+        return pdf
+
+    def enter(
+        self,
+        scene: CompiledScene,
+        rays: ShadowRays,
+        paths: Paths,
+        lanes: Ints,
+        light: Ints,
+        cos_g: Floats,
+        sampler: Sampler,
+        bounce: int,
+    ) -> None:
+        """Give shadow rays (k) of some lanes, which lead to lights (k,), the columns that they need."""
+
+    def aim(
+        self, paths: Paths, sample: BsdfSample, sampler: Sampler, bounce: int
+    ) -> tuple[BsdfSample, Floats, Floats]:
+        """Return samples of the BSDFs, their world directions (3, n), and the paths' `roulette_scale`."""
+        scale = paths.roulette_scale
+        return sample, self.frame.to_world(sample.wi), scale if sample.eta is None else scale * sample.eta**2
+
+    def leave(self, paths: Paths, left: Paths, cos_g: Floats, bounce: int) -> None:
+        """Change the columns of paths that have `left` with cosines (n,) against `ng`."""
 
 
-def _squared_tangent(cos: Floats) -> Floats:
-    cos2 = cos * cos
-    return np.maximum(f4(1) - cos2, f4(0)) / np.maximum(cos2, TINY)
+@cache
+def shading_kind(base: type[Shading], parts: tuple[type[Shading], ...]) -> type[Shading]:
+    """Return a kind of shading that is all of these, `base` innermost."""
+    return type(base.__name__, (*parts, base), {"__slots__": ()}) if parts else base
 
 
 def emitted(scene: CompiledScene, paths: Paths, hits: Hits) -> Contribution:
@@ -173,29 +197,6 @@ def mis_weighted(scene: CompiledScene, paths: Paths, emission: Contribution) -> 
     return Contribution(emission.lanes, emission.radiance * weight, emission.light)
 
 
-def without_caustics(
-    scene: CompiledScene, paths: Paths, left: Ints, hits: Hits, emission: Contribution
-) -> Contribution:
-    """Return emission but for that which paths from lights find (integrators/light_tracing.py).
-
-    Parameters
-    ----------
-    paths, left
-        n paths, and the primitives (n,) that they left, -1 for none.
-    hits, emission
-        What they hit, and the emission that they met there.
-    """
-    if scene.specular_surfaces is None or paths.light_traced is None:
-        return emission
-    lanes = emission.lanes
-    found = take(paths.light_traced, lanes) & take(paths.specular, lanes)
-    found &= scene.specular_surfaces.includes(take(left, lanes)) & (hits.prim.take(lanes) >= 0)
-    found &= scene.lights.chosen_from.take(emission.light)
-    if not found.any():
-        return emission
-    return emission.take(np.flatnonzero(~found))
-
-
 def shading(scene: CompiledScene, surface: SurfaceInteraction) -> Shading:
     """Return local frames and groups of surfaces; `compact` has ordered the lanes by group."""
     frame = surface.frame()
@@ -205,12 +206,10 @@ def shading(scene: CompiledScene, surface: SurfaceInteraction) -> Shading:
     else:
         wo = frame.to_local(surface.wo)
     receiver = receiver_of(surface, groups) if scene.lights.takes_receiver else None
-    shade = Shading(
+    shade = shading_kind(Shading, scene.program.shading)(
         surface, frame, wo, origin_above(surface), groups, receiver=receiver, materials=scene.materials
     )
-    if scene.media is not None:
-        shade.volume = np.flatnonzero(surface.prim < 0)
-        shade.crossing = crossings(scene, surface)
+    shade.prepare(scene)
     return shade
 
 
@@ -275,20 +274,14 @@ def direct(
     light, number = scene.lights.sample_li(shade.start, u_choice, u_point, shade.receiver)
     wi = shade.frame.to_local(light.wi)
     cos, cos_g = shade.cosines(wi, light.wi)
-    f, pdf = evaluate(shade, wi)
+    f, pdf = shade.evaluate(wi)
     lit = (light.pdf > 0) & (highest(f) * cos != 0)  # NaN stays, so that it reaches the picture
     lanes = np.flatnonzero(lit)
     through = (lit & (cos_g < 0)).any()
     origin = offset_origin(shade.surface, cos_g) if through else shade.start
     rays = shadow_rays(shade.surface, origin, light, lanes)
-    if scene.media is not None and paths.media is not None:
-        rays.media = take(shade.stacks(paths.media[:, :n], cos_g), lanes)
-        if (scene.media.light_of >= 0).any():
-            rays.goal = scene.media.holding(take(number, lanes), len(scene.lights))
-        if scene.media.takes_steps:
-            which = take(address[0], lanes), take(address[1], lanes)
-            rays.steps = StepNumbers.of(sampler.seed, *which, bounce, Dimension.TRANSMITTANCE)
     number = take(number, lanes)
+    shade.enter(scene, rays, paths, lanes, number, cos_g, sampler, bounce)
     radiance = radiance_at_samples(scene, rays, light, lanes, number)
     if scene.program.dims_shadows:
         radiance = radiance * transmittance_along(scene, rays)
@@ -298,8 +291,7 @@ def direct(
     pdf_light, pdf = take(light.pdf, lanes), take(pdf, lanes)
     scale = cos.take(lanes) / pdf_light
     if mis:
-        if shade.guidance is not None:
-            pdf = shade.guidance.mixed(lanes, take(light.wi, lanes), pdf)
+        pdf = shade.density(lanes, light.wi, pdf)
         scale *= scene.lights.mis_weight(number, pdf_light, pdf)
     arriving = f.take(lanes, 1) * radiance * scale
     directed = directed or paths.recorder.needs_directions
@@ -341,29 +333,3 @@ def radiance_at_samples(
         found = found * opacities_at(Passage(scene, unhidden, surface, None, 0), scene.program.see_through)
     radiance[:, some] = found
     return radiance
-
-
-def evaluate(shade: Shading, wi: Floats) -> tuple[Floats, Floats]:
-    """Return f (3, n), without the cosine, and the pdf (n,) of local directions wi (3, n)."""
-    f, pdf = evaluate_unfolded(shade, wi)
-    if shade.surface.folds is None:
-        return f, pdf
-    lanes, other = folded_onto(shade.surface, shade.frame, wi)
-    if lanes.size:
-        f, pdf = f.copy(), pdf.copy()
-        more, pdf_more = evaluate_unfolded(shade.at(lanes), other)
-        f[:, lanes] += more * (other[2] / wi[2].take(lanes))
-        pdf[lanes] += pdf_more
-    return f, pdf
-
-
-def evaluate_unfolded(shade: Shading, wi: Floats) -> tuple[Floats, Floats]:
-    """Return f (3, n) and the pdf (n,) as they are before directions are folded."""
-    if len(shade.groups) == 1:
-        return evaluated(shade.groups[0][1], shade.wo, wi)
-    n = wi.shape[1]
-    f, pdf = np.empty((3, n), f4), np.empty(n, f4)
-    for lanes, bsdf in shade.groups:
-        part_f, part_pdf = evaluated(bsdf, take(shade.wo, lanes), take(wi, lanes))
-        f[:, lanes], pdf[lanes] = part_f, part_pdf
-    return f, pdf
