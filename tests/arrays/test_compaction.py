@@ -17,7 +17,9 @@ from wavefront.accel.numpy_accel import NumpyAccelerator
 from wavefront.arrays.frame import Frame
 from wavefront.arrays.state import Hits, Paths, SurfaceInteraction
 from wavefront.arrays.vec import broadcast, f4, normalize
+from wavefront.compile.program import Program
 from wavefront.compile.scene import ROULETTE_AFTER, CompiledScene
+from wavefront.features.branches import Branches
 from wavefront.features.compiling import compile_scene
 from wavefront.sampling.sampler import make_sampler
 from wavefront.stages import compact as stage
@@ -181,8 +183,8 @@ def carrying(throughput: float, roulette_scale: float, n: int) -> Paths:
 
 def survivors(paths: Paths, bounce: int = ROULETTE_AFTER, branches: int = 1) -> Paths:
     """The paths that roulette leaves."""
-    scene: Any = SimpleNamespace(roulette_after=ROULETTE_AFTER)
-    return paths.take(stage.roulette(scene, paths, make_sampler("independent"), bounce, branches))
+    scene: Any = SimpleNamespace(roulette_after=ROULETTE_AFTER, program=Program([Branches(branches)]))
+    return paths.take(stage.roulette(scene, paths, make_sampler("independent"), bounce))
 
 
 @pytest.mark.parametrize("throughput", [0.45, 0.25, 0.05])
@@ -232,7 +234,7 @@ def test_paths_remember_by_how_much_glass_compresses(calls_of: Any) -> None:
     """η² inside a ball of index 1.5, 1 where they were reflected and after they have left it."""
     seen = []
 
-    def note(scene: CompiledScene, paths: Paths, sampler, bounce: int, branches: int):
+    def note(scene: CompiledScene, paths: Paths, sampler, bounce: int):
         seen.append(np.unique(paths.roulette_scale.round(4)).tolist())
         return np.arange(len(paths))
 

@@ -8,6 +8,7 @@ scene without features pays for none, and no stage asks for what is absent.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import field, replace
 from typing import TYPE_CHECKING, Any, ClassVar, Self, TypeVar
@@ -84,6 +85,8 @@ class Feature:
         Its surfaces let a part of the light of shadow rays through.
     shading
         A subclass of `stages.shade.Shading` whose methods act where surfaces are shaded; None for none.
+    ways
+        In how many ways each path goes on from its first surface.
     compared
         Two renders must have it in common so that one can go on from the checkpoint of the other. False where
         it follows from settings, which are compared by themselves.
@@ -95,6 +98,7 @@ class Feature:
     dims_shadows: ClassVar[bool] = False
     compared: ClassVar[bool] = True
     shading: ClassVar[Any] = None
+    ways: int = 1
 
     @classmethod
     def of(cls, facts: Facts) -> Self | None:
@@ -181,6 +185,8 @@ class Program:
         What the camera does not see as a surface.
     dims_shadows
         Whether shadow rays may arrive with a part of their light.
+    branches
+        How many paths a path from the camera becomes at its first surface.
     """
 
     def __init__(self, features: Sequence[Feature] = ()) -> None:
@@ -191,6 +197,7 @@ class Program:
             _at(self.features, point) for point in ("begin", "walk", "cross", "dim", "tilt", "weaken")
         )
         self.shading = tuple(each.shading for each in reversed(self.features) if each.shading is not None)
+        self.branches = math.prod(each.ways for each in self.features)
         self.see_through = self._later.see_through
         self.seen_through = tuple(each for each in self._camera.see_through if not each.drawn)
         self.unseen = tuple(each for each in self._camera.see_through if each.camera_only)
@@ -208,6 +215,14 @@ class Program:
     def leg(self, bounce: int) -> LegProgram:
         """Return what acts on the leg that ends at a bounce."""
         return self._later if bounce else self._camera
+
+    def ways(self, bounce: int) -> int:
+        """Return in how many ways each path goes on from the surfaces of a bounce."""
+        return 1 if bounce else self.branches
+
+    def plus(self, *features: Feature) -> Program:
+        """Return the program with more features, which act last."""
+        return Program([*self.features, *features])
 
     def of_sensors(self) -> Program:
         """Return the program of paths that start at sensors: these measure the light that is there."""

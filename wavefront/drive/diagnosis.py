@@ -16,6 +16,7 @@ from ..compile.program import Leg
 from ..compile.scene import CompiledScene
 from ..core.errors import warn_caller
 from ..image import Image
+from ..features.view import seen_with
 from ..integrators.light_tracing import trace_light
 from ..integrators.registry import integrator_for
 from ..lights import LightSample
@@ -266,12 +267,12 @@ def first_nan(user_scene: Scene, tracer: Tracer, view: CameraJob, pixels: Words,
     camera = view.camera
     sampler = tracer.sampler(camera.resolution[0])
     samples = np.full(pixels.size, sample, np.uint32)
-    paths = generate(tracer.scene, camera, sampler, pixels, samples, tracer.filter)
+    scene = seen_with(tracer.scene, tracer.table if view.guided else None, view.branches)
+    paths = generate(scene, camera, sampler, pixels, samples, tracer.filter)
     recorder = paths.recorder = NanRecorder(user_scene, tracer.layers)
-    table = tracer.table if view.guided else None
-    integrator = integrator_for(tracer.integrator, view.branches, view.tiles, table)
+    integrator = integrator_for(tracer.integrator, view.tiles)
     with np.errstate(all="ignore"):
-        integrator(tracer.scene, paths, sampler, tracer.max_bounces + camera.scatterings)
+        integrator(scene, paths, sampler, tracer.max_bounces + camera.scatterings)
         return recorder.place or _nan_of_light(tracer, camera, pixels, samples)
 
 

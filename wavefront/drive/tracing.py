@@ -18,6 +18,7 @@ from ..compile.scene import CompiledScene
 from ..core.errors import SceneError
 from ..core.interrupt import end_with_parent
 from ..core.shared import SharedInt, Stopped
+from ..features.view import seen_with
 from ..guiding import GuideTable
 from ..integrators import Integrator, integrator_for
 from ..integrators.light_tracing import trace_light
@@ -102,14 +103,14 @@ def _trace_wave(tracer: Tracer, monitor: WaveMonitor, job: Job) -> WaveResult:
     if not job.first_sample:
         deadline = max(deadline, begin + FIRST_SAMPLE_TIMEOUT)
     accelerator = MonitoredAccelerator(tracer.scene.accelerator, monitor, deadline)
-    scene = replace(tracer.scene, accelerator=accelerator)
+    whole = replace(tracer.scene, accelerator=accelerator)  # as paths from lights meet it
+    scene = seen_with(whole, tracer.table if job.view.guided else None, job.view.branches)
     sampler = tracer.sampler(camera.resolution[0])
     paths = generate(scene, camera, sampler, np.tile(job.pixels, n), _samples(job), tracer.filter)
     recorder = SampleRecorder(tracer.layers, scene, k * n, tracer.clamp) if tracer.layers else None
     if recorder is not None:
         recorder.prepare(paths)
-    table = tracer.table if job.view.guided else None
-    integrator = integrator_for(tracer.integrator, job.view.branches, job.view.tiles, table)
+    integrator = integrator_for(tracer.integrator, job.view.tiles)
     radiance = integrator(scene, paths, sampler, tracer.max_bounces + camera.scatterings)
     _check_radiance(integrator, radiance, k * n)
     finite = np.logical_and.reduce(np.isfinite(radiance))
@@ -118,7 +119,7 @@ def _trace_wave(tracer: Tracer, monitor: WaveMonitor, job: Job) -> WaveResult:
     splats = None
     if scene.specular_surfaces is not None:
         splats = trace_light(
-            scene, camera, sampler, np.tile(job.pixels, n), _samples(job), tracer.max_bounces
+            whole, camera, sampler, np.tile(job.pixels, n), _samples(job), tracer.max_bounces
         )
         good = np.isfinite(splats.radiance).all(0)
         finite[splats.path[~good]] = False

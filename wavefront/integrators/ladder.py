@@ -12,7 +12,6 @@ import numpy as np
 from ..arrays.state import Paths
 from ..arrays.vec import Floats, f4
 from ..compile.scene import CompiledScene
-from ..guiding import GuideTable
 from ..sampling.sampler import Sampler
 from ..stages.bounce import bounce_sample
 from ..stages.compact import alive, roulette, select, specular_lanes
@@ -64,24 +63,12 @@ def li_direct_mis(scene: CompiledScene, paths: Paths, sampler: Sampler, max_boun
     return L
 
 
-def li_full(
-    scene: CompiledScene,
-    paths: Paths,
-    sampler: Sampler,
-    max_bounces: int,
-    branches: int = 1,
-    table: GuideTable | None = None,
-) -> Floats:
-    """Estimate direct light by two samples at every bounce, and so all indirect light.
-
-    Each path splits into `branches` paths at its first surface, with a light sample for each. A `table`
-    guides directions.
-    """
+def li_full(scene: CompiledScene, paths: Paths, sampler: Sampler, max_bounces: int) -> Floats:
+    """Estimate direct light by two samples at every bounce, and so all indirect light."""
     L = np.zeros((3, len(paths)), f4)
     for bounce in range(max_bounces + 1):
         paths, hits = intersect_and_compact(scene, paths, sampler, bounce, L, mis=True)
         if bounce == max_bounces or not len(paths):
             break
-        ways = branches if bounce == 0 else 1
-        paths = scatter(scene, L, paths, hits, sampler, bounce, ways=ways, branches=branches, table=table)
+        paths = scatter(scene, L, paths, hits, sampler, bounce)
     return L

@@ -11,13 +11,11 @@ from ..arrays.soa import soa
 from ..arrays.state import Hits, Paths
 from ..arrays.vec import Floats, add_to_slots, f4, highest
 from ..compile.scene import CompiledScene
-from ..guiding import GuideTable
 from ..sampling.sampler import Sampler
 from ..sampling.tiles import Tiles, WaveTiles
 from ..stages.bounce import bounce_sample, branch, copies
 from ..stages.compact import alive, roulette, select
 from ..stages.glossy_points import SECTIONS, GlossyPoints
-from ..stages.guidance import guide
 from ..stages.reuse import SHARED_WAYS, add_shared, as_shared, can_reuse, shared_points
 from ..stages.shade import Shading, direct
 from .ladder import li_full
@@ -31,24 +29,22 @@ def li_reuse(
     max_bounces: int,
     *,
     tiles: Tiles,
-    branches: int = 1,
-    table: GuideTable | None = None,
 ) -> Floats:
     """Estimate the same as `li_full`, with paths that pixels share from their second points on.
 
     Direct light at the first points, and emission that paths meet at their second points, are not shared.
     """
     if not can_reuse(scene):
-        return li_full(scene, paths, sampler, max_bounces, branches, table)
+        return li_full(scene, paths, sampler, max_bounces)
     L = np.zeros((3, len(paths)), f4)
     in_wave = WaveTiles.of(paths.pixel, paths.sample, tiles)
     first, hits = intersect_and_compact(scene, paths, sampler, 0, L, mis=True)
     if max_bounces == 0 or not len(first):
         return L
-    shade = guide(prepare_shading(scene, first, hits), table)
+    shade = prepare_shading(scene, first, hits)
     accumulate(L, first, direct(scene, first, shade, sampler, 0, mis=True))
-    sharing = Sharing(scene, sampler, max_bounces, branches, table)
-    sharing.share(L, first, shade, branch(first, shade, sampler, 0, ways=branches), in_wave)
+    sharing = Sharing(scene, sampler, max_bounces)
+    sharing.share(L, first, shade, branch(first, shade, sampler, 0, scene.program.branches), in_wave)
     return L
 
 
@@ -57,13 +53,11 @@ Ways: TypeAlias = list[tuple[Paths, Hits]]
 
 @soa
 class Sharing:
-    """How paths go on from the first rough surfaces; `branches` and `table` are those of `li_full`."""
+    """How paths go on from the first rough surfaces."""
 
     scene: CompiledScene
     sampler: Sampler
     max_bounces: int
-    branches: int
-    table: GuideTable | None
 
     def share(self, L: Floats, first: Paths, shade: Shading, paths: Paths, tiles: WaveTiles) -> None:
         """Add to L, (3, n) of all slots, what first surfaces get from all but light samples.
@@ -75,11 +69,11 @@ class Sharing:
         paths
             Those that have left them.
         """
-        paths = select(paths, roulette(self.scene, paths, self.sampler, 0, self.branches))
+        paths = select(paths, roulette(self.scene, paths, self.sampler, 0))
         paths, hits = self._onward(paths, 0, L)
         if self.max_bounces == 1 or not len(paths):
             return
-        lanes, points, matte = shared_points(self.scene, paths, hits, self.branches)
+        lanes, points, matte = shared_points(self.scene, paths, hits, self.scene.program.branches)
         g = lanes.size - matte
         own = np.setdiff1d(np.arange(len(paths)), lanes, assume_unique=True)
         self._follow([(paths.take(own), hits.take(own))], 1, L)
@@ -96,7 +90,7 @@ class Sharing:
         for to, found in sums:
             found[:, :matte] *= f4(1 / SHARED_WAYS)
             add_to_slots(to, points.slot[some], points.throughput[:, some] * found[:, lanes.size :][:, :g])
-        add_shared(self.scene, sums, first, shade, points, tiles, self.branches, glossy)
+        add_shared(self.scene, sums, first, shade, points, tiles, self.scene.program.branches, glossy)
 
     def _glossy(self, paths: Paths, hits: Hits, light: Floats) -> tuple[GlossyPoints, Ways]:
         """Follow paths from g glossy points to their next surfaces, and return both.
@@ -105,7 +99,7 @@ class Sharing:
         own, by delta lobes or by emission, to that between them.
         """
         g = len(paths)
-        shade = guide(prepare_shading(self.scene, paths, hits), self.table)
+        shade = prepare_shading(self.scene, paths, hits)
         left = bounce_sample(paths, shade, self.sampler, 1)
         glossy, found = GlossyPoints.of(self.scene, paths, shade, self.sampler, left.direction)
         accumulate(light, paths, found)
@@ -132,8 +126,7 @@ class Sharing:
 
     def _scatter(self, paths: Paths, hits: Hits, bounce: int, L: Floats) -> Paths:
         """Add direct light to L, and return the paths that go on in new directions."""
-        branches, table = self.branches, self.table
-        return scatter(self.scene, L, paths, hits, self.sampler, bounce, branches=branches, table=table)
+        return scatter(self.scene, L, paths, hits, self.sampler, bounce)
 
     def _onward(self, paths: Paths, bounce: int, L: Floats) -> tuple[Paths, Hits]:
         """Return paths that have left the surfaces of a bounce, at their next ones."""

@@ -8,12 +8,10 @@ from ..arrays.state import Contribution, Hits, Paths
 from ..arrays.vec import Floats, Ints, f4
 from ..compile.program import Leg
 from ..compile.scene import CompiledScene
-from ..guiding import GuideTable
 from ..sampling.sampler import Sampler
 from ..stages.accumulate import accumulate
 from ..stages.bounce import branch, copies
 from ..stages.compact import compact, roulette, scattering_lanes, select
-from ..stages.guidance import guide
 from ..stages.interaction import interaction
 from ..stages.intersect import intersect
 from ..stages.sensors import at_sensors, sensor_shading
@@ -65,22 +63,13 @@ def prepare_shading(scene: CompiledScene, paths: Paths, hits: Hits) -> Shading:
 
 
 def scatter(
-    scene: CompiledScene,
-    L: Floats,
-    paths: Paths,
-    hits: Hits,
-    sampler: Sampler,
-    bounce: int,
-    *,
-    ways: int = 1,
-    branches: int = 1,
-    table: GuideTable | None = None,
+    scene: CompiledScene, L: Floats, paths: Paths, hits: Hits, sampler: Sampler, bounce: int
 ) -> Paths:
-    """Add direct light to L, and return the paths that go on in new directions, each in several ways."""
-    shade = guide(prepare_shading(scene, paths, hits), table)
+    """Add direct light to L, and return the paths that go on in new directions, in one or several ways."""
+    shade, ways = prepare_shading(scene, paths, hits), scene.program.ways(bounce)
     for each in copies(paths, ways):
         found = direct(scene, each, shade, sampler, bounce, mis=True)
         found.radiance *= f4(1 / ways)
         accumulate(L, each, found)
     paths = branch(paths, shade, sampler, bounce, ways)
-    return select(paths, roulette(scene, paths, sampler, bounce, branches))
+    return select(paths, roulette(scene, paths, sampler, bounce))

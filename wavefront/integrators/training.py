@@ -15,6 +15,7 @@ from ..arrays.state import Contribution, Paths, SoA, Words
 from ..arrays.vec import Floats, Ints, highest, take
 from ..camera import Camera
 from ..compile.scene import CompiledScene
+from ..features.view import seen_with
 from ..guiding import GuideCells, GuideTable
 from ..guiding.octahedral import bins_of
 from ..guiding.training import LEVELS, SIDE, Records, build_table, learn_shares
@@ -89,9 +90,10 @@ def _trace(
 ) -> tuple[Vertices, Floats]:
     """Trace a wave; return its vertices, and what each of their paths found afterwards, (k,)."""
     pixel, sample = _addresses(camera, first, count)
+    scene = seen_with(scene, table)
     paths = generate(scene, camera, sampler, pixel, sample)
     recorder = paths.recorder = VertexRecorder()
-    L = li_full(scene, paths, sampler, max_bounces + camera.scatterings, table=table)
+    L = li_full(scene, paths, sampler, max_bounces + camera.scatterings)
     joined = Vertices.concatenate(recorder.vertices) if recorder.vertices else _none()
     light = L.sum(0).take(joined.slot) - joined.found
     good = np.flatnonzero((joined.pdf > 0) & (joined.after > 0) & np.isfinite(light))

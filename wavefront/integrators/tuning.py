@@ -27,6 +27,7 @@ from ..arrays.vec import ALL, Doubles, Floats, Ints, f4
 from ..camera import Camera
 from ..compile.program import Leg
 from ..compile.scene import CompiledScene
+from ..features.view import seen_with
 from ..guiding import GuideTable
 from ..sampling.sampler import Sampler
 from ..stages.generate import generate
@@ -130,11 +131,11 @@ def tuning_run(
     pixel, counter = np.concatenate(pixels), RayCounter(scene.accelerator)
     n = BLOCKS * block * pixel.size
     sample = np.repeat(np.arange(BLOCKS * block, dtype=np.uint32), pixel.size)
-    scene = replace(scene, accelerator=counter)
+    scene = seen_with(replace(scene, accelerator=counter), table)
     paths = generate(scene, camera, sampler, np.tile(pixel, BLOCKS * block), sample)
     second = paths.recorder = SecondPoints(scene.materials.group_of.size)
     bounces = min(max_bounces, BOUNCES) + camera.scatterings
-    L = li_twins(scene, paths, sampler, bounces, table)
+    L = li_twins(scene, paths, sampler, bounces)
     every, own = (_blocks(each, block, pixel.size) for each in (L, L if second.own is None else second.own))
     scale = _scale(every.mean((0, 2)), pixels) if like is None else like.scale
     deviation, of_own = (_deviation(each) for each in (every, own))
@@ -179,9 +180,7 @@ def _scale(mean: Doubles, tiles: list[Words]) -> Doubles:
     return np.square(sums / sizes).repeat(sizes, -1) + (FLOOR * mean.mean() ** 2 or 1.0)
 
 
-def li_twins(
-    scene: CompiledScene, paths: Paths, sampler: Sampler, max_bounces: int, table: GuideTable | None = None
-) -> Floats:
+def li_twins(scene: CompiledScene, paths: Paths, sampler: Sampler, max_bounces: int) -> Floats:
     """Estimate the same as `li_full` twice, (3, 2 n), with the same first surfaces.
 
     The second ones, which come last, have the random numbers of the samples after all others from there on.
@@ -198,9 +197,7 @@ def li_twins(
         if bounce == 0:
             other, through = paths.sample + samples, paths.throughput.copy()
             each.append(replace(paths, slot=paths.slot + n, sample=other, throughput=through))
-        paths = Paths.concatenate(
-            [scatter(scene, L, some, hits, sampler, bounce, table=table) for some in each]
-        )
+        paths = Paths.concatenate([scatter(scene, L, some, hits, sampler, bounce) for some in each])
     return L
 
 

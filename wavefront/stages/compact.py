@@ -81,21 +81,20 @@ def alive(paths: Paths) -> Bools:
     return highest(paths.throughput) != 0
 
 
-def roulette(scene: CompiledScene, paths: Paths, sampler: Sampler, bounce: int, branches: int = 1) -> Ints:
+def roulette(scene: CompiledScene, paths: Paths, sampler: Sampler, bounce: int) -> Ints:
     """Return the lanes of paths that survive, and divide their throughput by the probability of that.
 
     The probability is the ratio of the path's throughput and `ROULETTE_THRESHOLD`, at most 1. The throughput
     counts by its largest channel, times `roulette_scale`, which undoes the scaling of radiance by refraction
-    and the effect of a guide, and relative to 1 / `branches`, with which the paths of a branched path begin.
+    and the effect of a guide, and relative to 1 / branches, with which the paths of a branched path begin.
     During the first `scene.roulette_after` events only paths without throughput end.
 
     Sources: E. Veach, thesis 1997, §10.4.1; pbrt-v4, §13.2.1.
     """
     if bounce < scene.roulette_after or not len(paths):
         return np.flatnonzero(alive(paths))
-    chance = np.clip(
-        highest(paths.throughput) * paths.roulette_scale * (branches / ROULETTE_THRESHOLD), TINY, f4(1)
-    )
+    scale = scene.program.branches / ROULETTE_THRESHOLD
+    chance = np.clip(highest(paths.throughput) * paths.roulette_scale * scale, TINY, f4(1))
     u = sampler.draw_1d(paths.pixel, paths.sample, bounce, Dimension.ROULETTE)
     paths.throughput /= chance
     return np.flatnonzero(~(u >= chance))  # NaN survives, so that it reaches the picture

@@ -95,7 +95,7 @@ class GlossyPoints:
 def _evaluated(shade: Shading, world: Floats) -> tuple[Floats, Floats]:
     """Return f (3, k), without the cosine, and the density (k,) of world directions (3, k)."""
     f, pdf = shade.evaluate(shade.frame.to_local(world))
-    return f, pdf if shade.guidance is None else shade.guidance.mixed(ALL, world, pdf)
+    return f, shade.density(ALL, world, pdf)
 
 
 def glossy_materials(scene: CompiledScene) -> Bools:

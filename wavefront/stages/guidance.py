@@ -21,24 +21,21 @@ from .shade import Guidance, Shading
 LEAST_PDF_RATIO = f4(1e-3)  # least density of the BSDF, relative to that of the mixture, for roulette
 
 
-def guide(shade: Shading, table: GuideTable | None) -> Shading:
-    """Let the table choose directions at the surfaces where it may; None leaves them as they are.
+def guide(shade: Shading, table: GuideTable) -> None:
+    """Let the table choose directions at the surfaces where it may.
 
     Surfaces that only have delta lobes cannot be guided, and transmissive ones are not: their light comes
     from two sides.
     """
-    if table is None:
-        return shade
     lit = shade.lit()
     if not lit.groups:
-        return shade
+        return
     row = table.rows(lit.surface.point, lit.surface.ns)
     share = table.share.take(row)
     for lanes, bsdf in lit.groups:
         if bsdf.transmissive:
             share[lanes] = 0
     shade.guidance = Guidance(table, row, share)
-    return shade
 
 
 def mix_with_guide(

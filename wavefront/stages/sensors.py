@@ -127,7 +127,9 @@ def sensor_shading(scene: CompiledScene, paths: Paths) -> Shading:
     )
     groups: list[tuple[Lanes, Bsdf]] = [(slice(0, n), paths.sensor)]
     receiver = receiver_of(surface, groups) if scene.lights.takes_receiver else None
-    up, volume = np.broadcast_to(UP, normal.shape), np.arange(n) if paths.sensor.transmissive else None
-    return shading_kind(SensorShading, scene.program.shading)(
-        surface, surface.frame(), up, origin_above(surface), groups, receiver=receiver, volume=volume
-    )
+    up, kind = np.broadcast_to(UP, normal.shape), shading_kind(SensorShading, scene.program.shading)
+    shade = kind(surface, surface.frame(), up, origin_above(surface), groups, receiver=receiver)
+    shade.prepare(scene)
+    shade.volume = np.arange(n) if paths.sensor.transmissive else None
+    shade.crossing = None  # sensors are no boundary of media
+    return shade

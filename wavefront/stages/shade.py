@@ -130,7 +130,7 @@ class Shading:
     def prepare(self, scene: CompiledScene) -> None:
         """Get ready to be shaded."""
 
-    def density(self, lanes: Ints, world: Floats, pdf: Floats) -> Floats:
+    def density(self, lanes: Lanes, world: Floats, pdf: Floats) -> Floats:
         """Return the densities (k,) with which paths take world directions, given those of the BSDFs.
 
         `world` (3, n) are directions of all lanes of `lit`, of which `lanes` (k,) are looked at.
