@@ -15,8 +15,8 @@ from ..compile.instances import sort_shapes
 from ..compile.program import Leg
 from ..compile.scene import CompiledScene
 from ..core.errors import warn_caller
-from ..image import Image
 from ..features.view import seen_with
+from ..image import Image
 from ..integrators.light_tracing import trace_light
 from ..integrators.registry import integrator_for
 from ..lights import LightSample
