@@ -28,6 +28,7 @@ from .bsdfs import (
 )
 from .camera import Camera
 from .colors import blackbody, exposure, from_photometric, srgb, to_photometric
+from .compile.program import Feature
 from .core.errors import Interrupted, RenderError, SaveError, SceneError
 from .core.html import register_preview
 from .core.suggestions import did_you_mean
@@ -180,6 +181,7 @@ __all__ = [
     "Edges",
     "Emitters",
     "Environment",
+    "Feature",
     "Frame",
     "GaussianFilter",
     "Geometry",

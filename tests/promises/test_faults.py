@@ -242,14 +242,13 @@ def test_a_layer_that_is_not_finite_is_dropped_counted_and_named(layer: str, val
 def test_a_normal_that_is_not_finite_is_dropped() -> None:
     scene = wall_of(wf.Diffuse(0.5))
 
-    def spoil(surface: Any) -> None:
-        surface.ns = surface.ns.copy()
-        surface.ns[:, surface.point[0] > 1] = np.nan
+    class Spoiled(wf.Feature):
+        def tilt(self, scene: Any, rays: Any, surface: Any) -> None:
+            surface.ns = surface.ns.copy()
+            surface.ns[:, surface.point[0] > 1] = np.nan
 
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr("wavefront.aovs.recorder.perturb_normals", lambda scene, surface: spoil(surface))
-        with pytest.raises(wf.RenderError, match="were not finite and were dropped") as caught:
-            render(scene, 4, aovs="denoising_normal", max_bounces=0)
+    with pytest.raises(wf.RenderError, match="were not finite and were dropped") as caught:
+        render(scene, 4, aovs="denoising_normal", max_bounces=0, features=Spoiled())
     image = caught.value.image
     assert 0 < image.metadata["bad_samples"] < 4 * 256
     assert np.isfinite(image.denoising_normal).all()

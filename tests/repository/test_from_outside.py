@@ -280,3 +280,9 @@ def test_a_format_needs_a_function_and_a_free_extension():
             wf.register_format(".PNG", **{word: bytes})
     with pytest.raises(wf.SceneError, match=r"extension '\.obj' is registered already"):
         wf.register_format(".obj", load=lambda path, data: None)
+
+
+def test_a_feature() -> None:
+    fog = example("Feature", "CameraFog")(0.1, (0.5, 0.6, 0.7))
+    clear, foggy = (picture(room(), features=each).rgb for each in ([], fog))
+    assert (foggy != clear).all(-1).mean() > 0.9

@@ -35,6 +35,7 @@ VALUES: dict[str, Any] = {  # of each setting, one that is not its default
     "ground": True,
     "background": "white",
     ANOTHER: "direct_mis",
+    "features": wf.Feature(),
     "max_bounces": 3,
     "roulette": False,
     "seed": 5,

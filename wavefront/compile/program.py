@@ -16,11 +16,12 @@ from typing import TYPE_CHECKING, Any, ClassVar, Self, TypeVar
 from ..arrays.soa import soa
 from ..arrays.state import Contribution, Hits, Paths, Rays, SurfaceInteraction
 from ..arrays.vec import Bools, Floats, Ints, Lanes
+from ..core.errors import SceneError, in_brief
 from ..materials import Material
+from ..sampling.sampler import Dimension, Sampler, numbers_of
 from ..scene import Scene
 
 if TYPE_CHECKING:
-    from ..sampling.sampler import Sampler
     from .scene import CompiledScene
 
 
@@ -73,7 +74,8 @@ class Passage:
 class Feature:
     """What few scenes have, and where it acts. A subclass overrides `of` and the points where it acts.
 
-    A feature is sent to workers with the scene, so its attributes are arrays and the like.
+    A feature is sent to workers with the scene, so its attributes are arrays and the like. Those of your own
+    are given as `features=` of a render. They act after all others. Paths from lights do not meet them.
 
     Attributes
     ----------
@@ -87,9 +89,22 @@ class Feature:
         A subclass of `stages.shade.Shading` whose methods act where surfaces are shaded; None for none.
     ways
         In how many ways each path goes on from its first surface.
+    dimensions
+        Numbers that `sampler.draw_1d` and `draw_2d` take for features of your own. Two of one render must not
+        draw by the same one.
     compared
         Two renders must have it in common so that one can go on from the checkpoint of the other. False where
         it follows from settings, which are compared by themselves.
+
+    Examples
+    --------
+    >>> class Dusk(wf.Feature):
+    ...     '''Halves all light that the camera sees directly.'''
+    ...     camera_only = True
+    ...     def meet(self, leg):
+    ...         leg.emission.radiance = leg.emission.radiance / 2
+    >>> wf.render([wf.Sphere((0, 0, 0), 1), wf.Environment(1.0)], spp=1, size=(8, 8), features=Dusk())[0, 0]
+    array([0.5, 0.5, 0.5], dtype=float32)
     """
 
     __slots__ = ()
@@ -99,6 +114,7 @@ class Feature:
     compared: ClassVar[bool] = True
     shading: ClassVar[Any] = None
     ways: int = 1
+    dimensions: ClassVar[range] = numbers_of(Dimension.FEATURE)
 
     @classmethod
     def of(cls, facts: Facts) -> Self | None:
@@ -151,6 +167,23 @@ class Feature:
 
 LEG_POINTS = ("fly", "meet")
 AnyFeature = TypeVar("AnyFeature", bound=Feature)
+
+
+def check_features(name: str, value: Any) -> tuple[Feature, ...]:
+    """Check features of a user's own, and return them as a tuple.
+
+    Raises
+    ------
+    SceneError
+        If something else is among them.
+    """
+    given = tuple(value) if isinstance(value, list | tuple) else (value,)
+    for each in given:
+        if not isinstance(each, Feature):
+            raise SceneError(
+                f"{name} is {in_brief(value)}; it must be one or more objects of subclasses of wf.Feature"
+            )
+    return given
 
 
 class LegProgram:

@@ -142,7 +142,7 @@ def gather_scene(
         cannot emit light, a light is malformed, too far away or too strong for the scene's size, or the
         choice is unknown.
     """
-    low, high = scene.bounds
+    asked, (low, high) = asked or {}, scene.bounds
     radius = float(np.linalg.norm(high - low)) / 2
     scale = length_factor(radius)
     check_lights(scene.lights, (low + high) / 2, scale)
@@ -234,4 +234,4 @@ def gather_scene(
         media=media,
         places=MortonGrid.over((high - low) / 2) if len(triangles) >= LARGE else None,
     )
-    return Facts(scene, compiled, user_materials, has_alpha, asked or {}, (), [])
+    return Facts(scene, compiled, user_materials, has_alpha, asked, asked.get("features", ()), [])

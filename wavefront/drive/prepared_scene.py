@@ -87,7 +87,7 @@ class PreparedScene:
                 most_copies(settings.values["accel"]),
                 mis=INTEGRATORS.find(settings.values["integrator"]) in WITH_MIS,
                 caustics=settings.values["caustics"],
-                asked={"background": settings.background_color},
+                asked={"background": settings.background_color, "features": values["features"]},
             )
         if compiled.media is not None and not compiled.media.only_absorbs:
             check_combinations({**values, MEDIA: True})

@@ -55,6 +55,7 @@ class Dimension(IntEnum):
     SPECULAR_POINT = 2**20 + 3  # 2-D: where on it
     MEDIUM = 2**21  # 2-D: where a medium scatters, by channel and distance; repeats along the ray, up to 2²²
     TRANSMITTANCE = 2**22  # of light samples through media; repeats along the ray, up to 2²³
+    FEATURE = 2**23  # of a user's own features (`Feature.dimensions`), up to 2²⁴
 
 
 # At the first vertex: decisions whose points are the last two coordinates of the points of PIXEL. What they
@@ -65,6 +66,7 @@ REPEATED = {
     Dimension.OPACITY: 2**20,
     Dimension.MEDIUM: 2**22,
     Dimension.TRANSMITTANCE: 2**23,
+    Dimension.FEATURE: 2**24,
 }  # decisions that repeat, and one past the last of their numbers
 
 

@@ -17,6 +17,7 @@ from numpy.typing import ArrayLike
 
 from ..accel.registry import ACCELERATORS, AcceleratorMaker
 from ..camera import Camera, ImageSize, check_camera, field_of_view, image_size
+from ..compile.program import Feature, check_features
 from ..compile.scene import ROULETTE_AFTER
 from ..core.errors import flag
 from ..core.memory import memory_size
@@ -240,6 +241,14 @@ class RenderSettings(TypedDict, total=False):
             option="light transport algorithm",
             choices=INTEGRATORS,
             identity=True,
+        ),
+    ]
+    features: Annotated[
+        Feature | Sequence[Feature],
+        Setting(
+            (),
+            "Features of your own, such as a fog that only the camera sees; docs/extending.md has it.",
+            check=check_features,
         ),
     ]
     max_bounces: Annotated[
