@@ -8,11 +8,11 @@ that a picture of 64 samples that gets 64 more is the one of 128.
 from __future__ import annotations
 
 from dataclasses import replace
-from functools import partial
 
 from ..arrays.soa import soa
 from ..camera import Camera
 from ..compile.scene import CompiledScene
+from ..core.progress import phase
 from ..guiding import GuideTable
 from ..integrators.training import train
 from ..integrators.tuning import BRANCHES, Run, tuning_run
@@ -22,6 +22,7 @@ from ..settings import AUTO, Settings
 from ..settings.checks import left_out
 from ..stages.glossy_points import glossy_materials
 from ..stages.reuse import can_reuse, shared_materials
+from ..workers.machine import single_threaded_blas
 
 LEAST_PIXELS = 192 * 192  # of pictures that get a tuning run; smaller ones take no longer than a moment
 GUIDE_HINT = "most light is hard to find here: guide=True may pay (docs/guiding.md)"
@@ -46,15 +47,13 @@ class Choice:
 
 
 def learn_guide(settings: Settings, scene: CompiledScene, camera: Camera) -> GuideTable | None:
-    """Return the table that may guide the paths of a picture; None if there is nothing to learn.
-
-    Parameters
-    ----------
-    camera
-        In the unit of the compiled scene.
-    """
-    sampler = make_sampler(settings.values["sampler"], settings.training_seed(), camera.resolution[0])
-    return train(scene, camera, sampler, settings.values["max_bounces"])
+    """Return the table that may guide the paths that a camera sees; None if none is asked for."""
+    values = settings.values
+    if not values["guide"] or not settings.is_full:
+        return None
+    with phase("learning where light comes from", values["progress"]), single_threaded_blas:
+        sampler = make_sampler(values["sampler"], settings.training_seed(), camera.resolution[0])
+        return train(scene.seen_by(camera), scene.view(camera), sampler, values["max_bounces"])
 
 
 def choose(
@@ -81,7 +80,12 @@ def choose(
         return replace(asked, branches=BRANCHES)
     whole = camera.cropped((0, 0, *camera.resolution))  # a window is a part of the same picture
     sampler = maker(settings.training_seed(1), whole.resolution[0])
-    tune = partial(tuning_run, scene, whole, sampler, settings.values["max_bounces"])
+
+    def tune(tiles: int | None = None, table: GuideTable | None = None, like: Run | None = None) -> Run:
+        bounces = settings.values["max_bounces"]
+        with phase("trying what pays", settings.values["progress"]), single_threaded_blas:
+            return tuning_run(scene, whole, sampler, bounces, tiles=tiles, table=table, like=like)
+
     if settings.is_full and table is not None and settings.values["guide"] == AUTO:
         unguided = tune(tiles=GUIDE_TILES)
         guided = tune(tiles=GUIDE_TILES, table=table, like=unguided)

@@ -8,6 +8,7 @@ import time
 from collections.abc import Callable, Mapping, Sequence
 from copy import deepcopy
 from dataclasses import replace
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -309,6 +310,15 @@ class Picture:
             metadata[BEFORE_DENOISING] = True
         pixels = None if step is None else step.pixels
         return Checkpoint(self.sums, metadata, state, pixels, command)
+
+    def keep(self, command: dict[str, Any] | None) -> SaveError | MemoryError | None:
+        """Write the checkpoint, where one is kept; return why it cannot be written, if it cannot."""
+        return None if self.file is None else self.file.write(partial(self.checkpoint, command))
+
+    def keep_if_due(self, command: dict[str, Any] | None) -> None:
+        """Write the checkpoint, where one is kept and the last write is long ago; warn once if it fails."""
+        if self.file is not None:
+            self.file.write_if_due(partial(self.checkpoint, command))
 
     def _count_earlier(self, state: Mapping[str, Any]) -> None:
         """Take over what a checkpoint counts beside its sums."""

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from contextlib import nullcontext
 from contextvars import Context
 from dataclasses import replace
 from functools import cache
@@ -14,17 +13,16 @@ from ..camera import Camera
 from ..core.errors import SceneError
 from ..core.memory import check_memory, megabytes, resident_memory
 from ..core.plural import plural
-from ..core.progress import phase
 from ..film.aov_names import LUX, aov_of
 from ..film.picture_sums import empty_sums
 from ..film.sums import bytes_per_pixel
 from ..guiding import GuideTable
 from ..integrators import INTEGRATORS
 from ..sampling.filters import FILTERS
+from ..sampling.sampler import SAMPLERS
 from ..settings import Settings
 from ..workers.executors import ExecutorLike, needs_pickling
-from ..workers.machine import single_threaded_blas
-from .choice import Choice, choose, learn_guide
+from .choice import Choice, choose
 from .hints import caustics_hint
 from .jobs import SMALL_WAVE, default_wave_size
 from .prepared_scene import PreparedScene
@@ -136,31 +134,20 @@ class Plan:
     choice: Choice = NO_CHOICE  # until there is one
 
 
-def trained_guide(settings: Settings, scene: PreparedScene, camera: Camera) -> GuideTable | None:
-    """Return the table that may guide the paths that a camera sees; None if none is asked for."""
-    if not settings.values["guide"] or not settings.is_full:
-        return None
-    with phase("learning where light comes from", settings.values["progress"]), single_threaded_blas:
-        return learn_guide(settings, scene.compiled.seen_by(camera), scene.compiled.view(camera))
-
-
 def with_choice(plan: Plan, camera: Camera) -> Plan:
     """Return a plan with a choice of how the paths that a camera sees go on."""
     tracer, view = plan.tracer, plan.scene.compiled.view(camera)
-    title = nullcontext() if plan.inline else phase("trying what pays", plan.settings.values["progress"])
-    with title, nullcontext() if plan.inline else single_threaded_blas:
-        # in a context of its own: the caller's `np.errstate` is not that of its paths
-        choice = Context().run(choose, plan.settings, tracer.scene, view, tracer.make_sampler, tracer.table)
+    # in a context of its own: the caller's `np.errstate` is not that of its paths
+    choice = Context().run(choose, plan.settings, tracer.scene, view, tracer.make_sampler, tracer.table)
     hint = caustics_hint(plan.settings, plan.scene) if camera.sensor is None else None
-    hint = hint or choice.hint
-    return replace(plan, choice=replace(choice, hint=hint))
+    return replace(plan, choice=replace(choice, hint=hint or choice.hint))
 
 
 def make_plan(settings: Settings, scene: PreparedScene, camera: Camera, table: GuideTable | None) -> Plan:
     """Return how the view of a camera is rendered, given what may guide its paths."""
     tracer = Tracer(
         scene.compiled.seen_by(camera),
-        settings.sampler_maker(),
+        SAMPLERS.find(settings.values["sampler"]),
         settings.values["seed"],
         FILTERS.find(settings.values["filter"]),
         INTEGRATORS.find(settings.values["integrator"]),
@@ -197,7 +184,7 @@ def budget_of(
 def fits_a_wave(settings: Settings, size: tuple[int, int], budget: Budget) -> bool:
     """Return whether a picture is one small wave, so that neither threads nor processes make it faster."""
     values = settings.values
-    if values["executor"] is not None or values["seconds"] is not None or values["guide"]:
+    if values["executor"] is not None or values["seconds"] is not None:
         return False
     paths = size[0] * size[1] * settings.max_spp * settings.most_branches
     return paths <= min(SMALL_WAVE, budget.wave_size)

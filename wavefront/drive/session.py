@@ -15,17 +15,17 @@ from typing import Any, Self, Unpack
 from ..aovs.boxes import silhouettes
 from ..arrays.vec import Bools
 from ..camera import Camera, ImageSize, check_camera, image_size
-from ..core.errors import RenderError, SaveError, SceneError, warn_caller
+from ..core.errors import RenderError, SceneError, warn_caller
 from ..core.interrupt import InterruptHandler
 from ..core.shared import STOP, SharedInt
 from ..core.suggestions import suggests_keywords
-from ..film.checkpoint import Checkpoint
 from ..film.picture_sums import PictureSums, empty_sums
 from ..image import Image
 from ..io.to_scene import as_scene, choose_camera, coloring_of
 from ..settings import RenderSettings, Settings, describes_settings, takes_settings
 from ..workers.machine import reserve_buffers
 from ..workers.pool import WorkerPool
+from .choice import learn_guide
 from .final_checks import (
     LONG_PATH,
     check_last_image,
@@ -37,7 +37,7 @@ from .final_checks import (
 from .hints import Hints
 from .inline import AnyPool, InlineWorker
 from .picture import Picture
-from .plan import budget_of, fits_a_wave, make_plan, trained_guide, with_choice
+from .plan import budget_of, fits_a_wave, make_plan, with_choice
 from .prepared_scene import PreparedScene
 from .tracing import WaveMonitor, trace_job
 from .work import Work, doubling, undivided
@@ -156,7 +156,8 @@ class Session:
         if camera.sensor is None:
             settings = self._settings = settings.ending(self._scene.light_is_chosen)
         self._hints = Hints(settings, self._scene)
-        self._plan = make_plan(settings, self._scene, camera, trained_guide(settings, self._scene, camera))
+        table = learn_guide(settings, self._scene.compiled, camera)
+        self._plan = make_plan(settings, self._scene, camera, table)
         self._make_pool()
         try:
             with self.interrupt_handler:
@@ -336,7 +337,7 @@ class Session:
             other_workers = (executor, self._plan.executor) == ("processes", "threads")
             other_workers |= budget.workers != self._plan.budget.workers
             other_workers |= fits_a_wave(settings, camera.size, budget) != self._plan.inline
-            table = trained_guide(settings, self._scene, camera)
+            table = learn_guide(settings, self._scene.compiled, camera)
             other_workers |= table is not self._plan.tracer.table
             if self._monitor.stop.value or other_workers:
                 self._pool.close()
@@ -384,7 +385,7 @@ class Session:
         """
         sums = self._picture.sums
         sums.identity = sums.identity or self._picture.identity()
-        self._make_checkpoint().write(path)
+        self._picture.checkpoint(self.command).write(path)
 
     def identity(self) -> dict[str, Any]:
         """Return what another render must have in common with this one so that its samples are the same.
@@ -443,8 +444,7 @@ class Session:
 
     def _wave_done(self) -> None:
         """Write the checkpoint when it is due, and warn once of paths that do not end."""
-        if self._picture.file is not None:
-            self._picture.file.write_if_due(self._make_checkpoint)
+        self._picture.keep_if_due(self.command)
         long = self._settings.values["max_bounces"] > LONG_PATH and self._monitor.surfaces.value > LONG_PATH
         if long and not self._warned:
             self._warned = True
@@ -464,7 +464,7 @@ class Session:
         picture.release_reserve()
         if self._dropped and failure is None and not self._interrupted:
             return None
-        not_written = self._write_checkpoint()
+        not_written = picture.keep(self.command)
         image = picture.last_image(self._interrupted or self._stopped, free_sums=self._once)
         if not_written is not None and (failure is not None or self._interrupted):
             warn_caller(f"the checkpoint was not written: {not_written}")
@@ -487,14 +487,6 @@ class Session:
     def _interrupted(self) -> bool:
         return self._work.interrupted or self.interrupt_handler.pressed
 
-    def _make_checkpoint(self) -> Checkpoint:
-        """Return the render so far."""
-        return self._picture.checkpoint(self.command)
-
-    def _write_checkpoint(self) -> SaveError | MemoryError | None:
-        """Write the checkpoint, where one is kept; return why it cannot be written, if it cannot."""
-        return None if self._picture.file is None else self._picture.file.write(self._make_checkpoint)
-
     def _how_to_go_on(self) -> str:
         """Return what a message says of the checkpoint; "" where none is kept."""
         if self._settings.values["checkpoint"] is None:
@@ -505,6 +497,6 @@ class Session:
 
     def _keep_render(self) -> None:
         """Write the checkpoint of a render that is left before its end; warn if that is not possible."""
-        error = self._write_checkpoint()
+        error = self._picture.keep(self.command)
         if error is not None:
             warn_caller(f"the checkpoint was not written: {error}")

@@ -13,7 +13,7 @@ from ..film.aov_names import CLAMPED, GUIDES, chosen_aovs, sampled_names
 from ..film.exact_sum import MAX_TERMS
 from ..integrators import INTEGRATORS, li_full
 from ..integrators.tuning import BRANCHES
-from ..sampling.sampler import SAMPLERS, SamplerMaker, make_sampler
+from ..sampling.sampler import make_sampler
 from ..stages.reuse import SHARED_WAYS
 from ..workers.executors import ExecutorLike, choose_executor, worker_count
 from .checks import AUTO, check_combinations, whole_number
@@ -179,10 +179,6 @@ class Settings:
     def most_branches(self) -> int:
         """The most branches that a path may have."""
         return BRANCHES if isinstance(self.values["branches"], str) else self.values["branches"]
-
-    def sampler_maker(self) -> SamplerMaker:
-        """Return what makes the sampler of a picture, given a seed and how many pixels wide it is."""
-        return SAMPLERS.find(self.values["sampler"])
 
     def training_seed(self, number: int = 0) -> int:
         """Return the seed of the training of a guide, or of a tuning run, whose numbers are their own."""
