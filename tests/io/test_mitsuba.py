@@ -18,13 +18,14 @@ from measurements import adaptive_fields, tensor_file
 import wavefront as wf
 from wavefront.codecs.images import write_image
 from wavefront.colors.spectrum import blackbody_spectrum, spectrum_rgb
+from wavefront.io.description.entity import Entity
 from wavefront.io.description.placing import facing
-from wavefront.io.losses import Losses
 from wavefront.io.mitsuba import convert as _  # noqa: F401  fills the table
-from wavefront.io.mitsuba.nodes import PLUGINS, Node
+from wavefront.io.mitsuba.nodes import TABLE, Job
 from wavefront.io.repair import RawMesh
 from wavefront.sampling.filters import FILTERS as FILTERS_HERE
 
+PLUGINS = {name: each for (kind, name), each in TABLE.makers.items()}
 OBJ = "v 0 0 0\nv 1 0 0\nv 0 1 0\nvt 0 0\nvt 1 0\nvt 0 1\nf 1/1 2/2 3/3\n"
 PLY = """ply
 format ascii 1.0
@@ -1450,15 +1451,15 @@ def test_the_table_says_what_is_read(name: str, calls_of: Any, tmp_path: Path) -
     if name == "sunsky" and None in map(importlib.util.find_spec, ("mitsuba", "pvlib")):
         pytest.skip("its data come with mitsuba, and the place of the sun from pvlib")
     files = files_of_scenes(tmp_path)
-    calls = calls_of("wavefront.io.mitsuba.nodes.Node.get")
+    calls = calls_of("wavefront.io.description.entity.Entity.get")
     for parameters in parameters_of(name, files):
         scene(False, **scene_with(name, parameters, files))
-    assert {call.args[1] for call in calls if call.args[0].plugin == name} == set(PLUGINS[name].reads)
+    assert {call.args[1] for call in calls if call.args[0].type == name} == set(PLUGINS[name].reads)
 
 
 def test_what_the_table_does_not_say_cannot_be_read() -> None:
     with pytest.raises(KeyError, match="does not read"):
-        Node("sphere", "", "", {}, Losses("")).get("softness")
+        Entity("shape", "sphere", "", "", {}, Job).get("softness")
 
 
 def test_the_documentation_lists_the_plugins() -> None:

@@ -1,4 +1,4 @@
-"""Parts of scene files of other renderers, with typed parameters, and the conversion of a scene of them."""
+"""The conversion of the entities of a scene, each once; what stands for those that are damaged."""
 
 from __future__ import annotations
 
@@ -7,13 +7,10 @@ from contextlib import contextmanager
 from copy import copy
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any, Generic, TypeVar
+from typing import Any, ClassVar, TypeVar
 
-import numpy as np
-
-from ...arrays.vec import Doubles
 from ...bsdfs import Diffuse, Measured, NullSurface
-from ...core.errors import LimitError, SceneError, exact, finite_array, in_brief, number, one_of
+from ...core.errors import LimitError, SceneError
 from ...core.plural import plural
 from ...lights import Environment, Light, Sky
 from ...materials import Material
@@ -26,6 +23,7 @@ from ..repair import RawMesh
 from ..sources import GRAY as GRAY_PIXEL
 from ..sources import SceneFiles
 from ..spectra import read_spectrum
+from .entity import Entity, Table
 
 MOST_INCLUDED = 15  # files inside each other
 GRAY = Material(Diffuse(0.5))
@@ -39,9 +37,6 @@ INSTEAD: dict[str, tuple[Any, str]] = {
     "shape": ((), "left out"),
     "sampler": ({}, "the default in its place"),
 }
-DIGITS = 3  # to which a number by a hair beyond its limit is rounded
-NUMBERS, VECTORS = ("float", "integer"), ("point3", "vector3", "point", "vector")
-P = TypeVar("P", bound="Part")
 T = TypeVar("T")
 
 
@@ -71,111 +66,23 @@ def check_included(place: str, files: SceneFiles, count: int, depth: int) -> Non
         raise PlacedError(f"{place}: files include each other; the limit is {MOST_INCLUDED} levels")
 
 
-class Part:
-    """A part of a scene, such as a shape or a light, with its parameters."""
-
-    kind: str  # what it is: a shape, a light, ...
-    lost: Losses  # of the load
-    label: str  # where it is, and what, for messages
-
-    def lose(self, what: str) -> None:
-        """Note something that is not honored."""
-        raise NotImplementedError
-
-    def one(self, name: str, default: Any, *types: str) -> Any:
-        """Return one value of a parameter of some types, where the format has types."""
-        raise NotImplementedError
-
-    def or_default(self, default: T, read: Callable[[], T]) -> T:
-        """Return what `read` returns; where it fails, that is noted, and the default stands in its place.
-
-        Raises
-        ------
-        SceneError
-            If there is no default.
-        """
-        try:
-            return read()
-        except SceneError:
-            if default is None:
-                raise
-            with self.lost.part(self.label, done=f"{_brief(default)} in its place"):
-                raise
-        return default
-
-    def number(self, name: str, default: float, holds: Any = None, limit: str = "") -> float:
-        """Return a number."""
-
-        def read() -> float:
-            value = self.one(name, default, *NUMBERS)
-            if holds is None:
-                return number(name, value)
-            found = number(name, value)
-            near = round(found, DIGITS) + 0.0
-            if holds(found) or not holds(near):
-                return number(name, value, holds, limit)
-            self.lost.note(name, self.label, exact(found), f"taken as {exact(near)}")
-            return near
-
-        return self.or_default(default, read)
-
-    def whole(self, name: str, default: int, least: int = 0, most: int = 2**31) -> int:
-        """Return a whole number."""
-        limit = f"a whole number from {least} to {most}"
-        return int(self.number(name, default, lambda x: x == int(x) and least <= x <= most, limit))
-
-    def flag(self, name: str, default: bool = False) -> bool:
-        """Return True or False."""
-
-        def read() -> bool:
-            value = self.one(name, default, "bool")
-            return bool(one_of(name, bool(value) if isinstance(value, np.bool_) else value, (True, False)))
-
-        return self.or_default(default, read)
-
-    def text(self, name: str, default: str | None = None) -> str:
-        """Return a string."""
-
-        def read() -> str:
-            value = self.one(name, default, "string")
-            if not isinstance(value, str):
-                raise SceneError(f"{name} is {in_brief(value)}; it must be a string")
-            return value
-
-        return read() if default is None else self.or_default(default, read)
-
-    def choice(self, name: str, default: str, choices: tuple[str, ...]) -> str:
-        """Return one of some strings."""
-        return self.or_default(default, lambda: str(one_of(name, self.text(name, default), choices)))
-
-    def vector(self, name: str, default: Any) -> Doubles:
-        """Return a point or vector, (3,)."""
-        read = lambda: finite_array(name, self.one(name, default, *VECTORS), (3,))  # noqa: E731
-        return read() if default is None else self.or_default(np.asarray(default, np.float64), read)
-
-
-def _brief(value: Any) -> str:
-    """Return what a message says of a default."""
-    if np.shape(value) == (4, 4):
-        return "no transform"
-    return str(np.asarray(value).tolist()) if np.ndim(value) else repr(value) if value != "" else "nothing"
-
-
 @dataclass
-class Conversion(Generic[P]):
+class Conversion:
     """The conversion of one scene."""
+
+    table: ClassVar[Table]  # the types of the format
 
     name: str  # for messages
     files: SceneFiles
     find: Callable[[str], Path]  # the path of a file that the scene names
     read_mesh: Callable[[Path], list[RawMesh]]
     made: dict[Any, Any] = field(default_factory=dict)  # what was converted already
-    making: list[P] = field(default_factory=list)  # what refers to what is converted now
+    making: list[Entity] = field(default_factory=list)  # what refers to what is converted now
     triangles: int = 0
     instances: int = 0
     instead: dict[str, tuple[Any, str]] = field(default_factory=lambda: dict(INSTEAD))
 
-    def convert(self, part: P) -> Any:
+    def convert(self, part: Entity) -> Any:
         """Return what becomes of a part; the same object for the same part."""
         if part not in self.made:
             if part in self.making:
@@ -187,7 +94,7 @@ class Conversion(Generic[P]):
                 self.making.pop()
         return self.made[part]
 
-    def _sound(self, part: P) -> Any:
+    def _sound(self, part: Entity) -> Any:
         """Return what becomes of a part; where it is damaged, what stands for it, which is noted."""
         if part.kind == "scene":
             with placed(part.label, self.name):
@@ -201,18 +108,24 @@ class Conversion(Generic[P]):
                 raise
         return make()
 
-    def stand_in(self, part: P) -> tuple[Callable[[], Any], str]:
+    def stand_in(self, part: Entity) -> tuple[Callable[[], Any], str]:
         """Return what makes that which stands for a damaged part, and what is said of it."""
-        made, done = self.instead.get(part.kind.rpartition(" ")[2], (None, "left out"))
+        made, done = self.instead.get(part.kind, (None, "left out"))
         return lambda: made, done
 
-    def converted(self, part: P) -> Any:
-        """Return what becomes of a part."""
-        raise NotImplementedError
+    def converted(self, part: Entity) -> Any:
+        """Return what becomes of a part, and note which of its parameters do not count."""
+        maker = part.maker
+        if maker.convert is None:
+            return self.replaced(part)
+        part.check()
+        made = maker.convert(part)
+        part.report()
+        return made
 
-    def replaced(self, part: P, kind: str) -> Any:
+    def replaced(self, part: Entity) -> Any:
         """Return what stands for a part that is not supported, which is noted."""
-        made, what = self.instead.get(kind, (None, "left out"))
+        made, what = self.instead.get(part.kind, (None, "left out"))
         part.lose(what)
         return made
 
@@ -236,12 +149,12 @@ class Conversion(Generic[P]):
         made: Material = self.once((id(material), *parts, *values), make)[0]
         return made
 
-    def picture(self, part: P, reference: str, instead: StoredImage = GRAY_PIXEL) -> StoredImage:
+    def picture(self, part: Entity, reference: str, instead: StoredImage = GRAY_PIXEL) -> StoredImage:
         """Return the image whose file a part names; a gray one if it is missing or damaged."""
         read = lambda: self.files.stored(self.find(reference))  # noqa: E731
         return self.files.shown(reference, read, part.label, instead) or instead
 
-    def measured(self, part: P) -> Measured:
+    def measured(self, part: Entity) -> Measured:
         """Return the BSDF of the measured material whose file a part names."""
         path = self.find(part.text("filename", ""))
         made: Measured = self.once(

@@ -12,9 +12,9 @@ import numpy as np
 
 from ...arrays.vec import Ints
 from ...core.errors import SceneError
+from ..description.entity import Entity
 from ..ply.rows import Rows
 from ..repair import RawMesh, Table, with_face_colors
-from .nodes import Node
 
 SERIES = (("r", "g", "b"), ("red", "green", "blue"), ("x", "y", "z"), ("0", "1", "2"), ("1", "2", "3"))
 OWN = re.compile(r"n?[xyz]|[uvst]|texture_[uv]|vertex_ind\w+")  # properties that are no attributes
@@ -44,13 +44,13 @@ def ply_attributes(rows: dict[str, Rows], face: Ints) -> dict[str, Table]:
     return found
 
 
-def with_attribute(name: str, raw: RawMesh, node: Node) -> RawMesh:
+def with_attribute(name: str, raw: RawMesh, entity: Entity) -> RawMesh:
     """Return a mesh whose colors are the attribute that the textures of its shape show."""
-    wanted = sorted(_shown(node))
+    wanted = sorted(_shown(entity))
     there = [each for each in wanted if each in raw.attributes]
     for each in wanted:
         if each not in there[:1]:
-            node.lose(f"the attribute {each!r}")
+            entity.lose(f"the attribute {each!r}")
     if not there:
         return raw
     values = raw.attributes[there[0]]
@@ -63,8 +63,8 @@ def with_attribute(name: str, raw: RawMesh, node: Node) -> RawMesh:
     return raw
 
 
-def _shown(node: Node) -> set[str]:
+def _shown(entity: Entity) -> set[str]:
     """Return the names of the attributes that a plugin and those in it show."""
-    if node.plugin == "mesh_attribute":
-        return {node.text("name")}
-    return {name for value in node.values.values() if isinstance(value, Node) for name in _shown(value)}
+    if entity.type == "mesh_attribute":
+        return {entity.text("name")}
+    return {name for value in entity.values.values() if isinstance(value, Entity) for name in _shown(value)}

@@ -28,8 +28,9 @@ from ...textures.base import BaseTexture
 from ...textures.image import Texture
 from ...textures.normal_map import BumpMap, NormalMap
 from ..description.computed import computed, product
+from ..description.entity import Entity
 from ..spectra import INDICES, METALS
-from .nodes import Job, Node, plugin, unsupported
+from .nodes import plugin, unsupported
 from .textures import as_color, bitmap, color, roughness, scalar
 
 LEAST_INDEX = 1e-6
@@ -64,8 +65,8 @@ class FacingSides(Sides):
         return super()._back_of(wo) | (wo[2] < BENT)
 
 
-def _named(node: Node, bsdf: Bsdf) -> Material:
-    return Material(bsdf, name=node.id or None)
+def _named(entity: Entity, bsdf: Bsdf) -> Material:
+    return Material(bsdf, name=entity.name or None)
 
 
 @plugin("conductor", "bsdf", "material eta k specular_reflectance")
@@ -75,117 +76,117 @@ def _named(node: Node, bsdf: Bsdf) -> Material:
     "material eta k specular_reflectance alpha alpha_u alpha_v distribution",
     harmless="sample_visible",
 )
-def _conductor(node: Node, job: Job) -> Material:
-    facets = _facets(node, job) if node.plugin == "roughconductor" else {}
-    tint = color(node, "specular_reflectance", 1.0, job)
-    name = node.or_default("none", lambda: _metal(node))
-    if "eta" in node.values or name == "none":
-        if node.plugin == "conductor" and "eta" not in node.values:
-            return _named(node, Mirror(tint))
-        eta, k = (color(node, each, to, job, "unbounded") for each, to in (("eta", 0.0), ("k", 1.0)))
+def _conductor(entity: Entity) -> Material:
+    facets = _facets(entity) if entity.type == "roughconductor" else {}
+    tint = color(entity, "specular_reflectance", 1.0)
+    name = entity.or_default("none", lambda: _metal(entity))
+    if "eta" in entity.values or name == "none":
+        if entity.type == "conductor" and "eta" not in entity.values:
+            return _named(entity, Mirror(tint))
+        eta, k = (color(entity, each, to, "unbounded") for each, to in (("eta", 0.0), ("k", 1.0)))
         eta = eta if isinstance(eta, BaseTexture) else np.maximum(eta, LEAST_INDEX)
         k = k if isinstance(k, BaseTexture) else np.maximum(k, 0)
     else:
         base = name.removesuffix("_palik") if name not in METALS else name
         eta, k = METALS[base]
         if base != name:
-            node.lose(f"material {name!r}; {base!r} in its place")
+            entity.lose(f"material {name!r}; {base!r} in its place")
         eta = np.maximum(eta, LEAST_INDEX)
-    return _named(node, Conductor(eta, k, reflectance=tint, **facets))
+    return _named(entity, Conductor(eta, k, reflectance=tint, **facets))
 
 
-def _metal(node: Node) -> str:
+def _metal(entity: Entity) -> str:
     """Return the name of the metal, which may be none."""
-    name = node.text("material", "none")
+    name = entity.text("material", "none")
     base = name.removesuffix("_palik") if name not in METALS else name
     return name if base in METALS else str(one_of("material", name, ("none", *METALS)))
 
 
 @plugin("twosided", "bsdf", holds="bsdf", harmless="allow_transmission")
-def _two_sided(node: Node, job: Job) -> Material:
-    front, *back = node.held("bsdf") or [job.only(node, "bsdf")]
-    material = _inner(front, job)
+def _two_sided(entity: Entity) -> Material:
+    front, *back = entity.held("bsdf") or [entity.only("bsdf")]
+    material = _inner(front)
     if not back or back[0] is front:
         return material
-    behind = _inner(back[0], job)
+    behind = _inner(back[0])
     if (behind.alpha, behind.normal_map) != (None, None):
-        node.lose("the mask or the normal map of its back")
-    return job.changed(material, bsdf=Sides(material.bsdf, behind.bsdf))
+        entity.lose("the mask or the normal map of its back")
+    return entity.job.changed(material, bsdf=Sides(material.bsdf, behind.bsdf))
 
 
 @plugin("mask", "bsdf", "opacity", holds="bsdf texture")
-def _mask(node: Node, job: Job) -> Material:
-    material = _inner(job.only(node, "bsdf"), job)
+def _mask(entity: Entity) -> Material:
+    material = _inner(entity.only("bsdf"))
     if material.alpha is not None:
-        node.lose("opacity, as there is another mask in it")
+        entity.lose("opacity, as there is another mask in it")
         return material
-    return job.changed(material, alpha=scalar(node, "opacity", 0.5, job))
+    return entity.job.changed(material, alpha=scalar(entity, "opacity", 0.5))
 
 
-plugin("null", "bsdf")(lambda node, job: Material(Diffuse(0), alpha=0.0, name=node.id or None))
+plugin("null", "bsdf")(lambda entity: Material(Diffuse(0), alpha=0.0, name=entity.name or None))
 plugin("measured", "bsdf", "filename", note="spectra become RGB under D65")(
-    lambda node, job: _named(node, job.measured(node))
+    lambda entity: _named(entity, entity.job.measured(entity))
 )
 
 
 @plugin("polarizer circular", "bsdf", "transmittance", harmless="theta polarizing left_handed", note=HALF)
 @plugin("retarder", "bsdf", "transmittance", harmless="theta delta", note="as in scenes without polarization")
-def _filter(node: Node, job: Job) -> Material:
+def _filter(entity: Entity) -> Material:
     """Return a pane that light passes straight: half of it, as light has no polarization here."""
-    passing = color(node, "transmittance", 1.0, job)
-    passing = computed(product, passing, 1.0 if node.plugin == "retarder" else 0.5)
+    passing = color(entity, "transmittance", 1.0)
+    passing = computed(product, passing, 1.0 if entity.type == "retarder" else 0.5)
     if isinstance(passing, BaseTexture) or np.ptp(passing) > 0:
-        return _named(node, ThinDielectric(1.0, transmittance=passing))
-    return Material(Diffuse(0), alpha=1 - float(np.mean(passing)), name=node.id or None)
+        return _named(entity, ThinDielectric(1.0, transmittance=passing))
+    return Material(Diffuse(0), alpha=1 - float(np.mean(passing)), name=entity.name or None)
 
 
 @plugin("blendbsdf", "bsdf", "weight", holds="bsdf texture")
-def _blend(node: Node, job: Job) -> Material:
-    parts = node.held("bsdf")
+def _blend(entity: Entity) -> Material:
+    parts = entity.held("bsdf")
     if len(parts) != 2:
         raise SceneError(f"holds {len(parts)} bsdfs; it needs two")
-    first, second = (_inner(part, job) for part in parts)
+    first, second = (_inner(part) for part in parts)
     for part in (first, second):
         if part.alpha is not None or part.normal_map is not None:
-            node.lose("the mask or the normal map of a bsdf in it")
-    one, two = [first.bsdf, second.bsdf] if is_one_sided(node) else [_sided(part, job) for part in parts]
-    return _named(node, Mix(one, two, scalar(node, "weight", 0.5, job)))
+            entity.lose("the mask or the normal map of a bsdf in it")
+    one, two = [first.bsdf, second.bsdf] if is_one_sided(entity) else [_sided(part) for part in parts]
+    return _named(entity, Mix(one, two, scalar(entity, "weight", 0.5)))
 
 
 @plugin("bumpmap", "bsdf", f"scale {MAPPED}", holds="bsdf texture", note="nearest texels have no slopes")
-def _bump(node: Node, job: Job) -> Material:
-    image = job.only(node, "texture")
-    return _mapped(node, job, image, lambda heights: BumpMap(heights, node.number("scale", 1.0)), "luminance")
+def _bump(entity: Entity) -> Material:
+    image = entity.only("texture")
+    return _mapped(entity, image, lambda heights: BumpMap(heights, entity.number("scale", 1.0)), "luminance")
 
 
 @plugin("normalmap", "bsdf", f"normalmap {MAPPED}", holds="bsdf")
-def _normal(node: Node, job: Job) -> Material:
-    image = node.get("normalmap")
-    if not isinstance(image, Node) or image.kind != "texture":
+def _normal(entity: Entity) -> Material:
+    image = entity.get("normalmap")
+    if not isinstance(image, Entity) or image.kind != "texture":
         raise SceneError(f"normalmap is {in_brief(image)}; it must be a texture")
-    return _mapped(node, job, image, ShadingFrameMap, None)
+    return _mapped(entity, image, ShadingFrameMap, None)
 
 
-unsupported("hair measured_polarized", "bsdf")
+unsupported("bsdf", "hair measured_polarized")
 
 
-def _inner(node: Node, job: Job) -> Material:
-    material: Material = job.convert(node)
+def _inner(entity: Entity) -> Material:
+    material: Material = entity.job.convert(entity)
     return material
 
 
-def _mapped(node: Node, job: Job, image: Node, make: Any, channel: Any) -> Material:
+def _mapped(entity: Entity, image: Entity, make: Any, channel: Any) -> Material:
     """Return the material in a plugin, with a map of its normals."""
-    material = _inner(job.only(node, "bsdf"), job)
+    material = _inner(entity.only("bsdf"))
     if material.normal_map is not None:
-        node.lose("the map, as there is another in its bsdf")
+        entity.lose("the map, as there is another in its bsdf")
         return material
-    if image.plugin == "bitmap":
-        texture = bitmap(image, job, channel, plain=True)
+    if image.type == "bitmap":
+        texture = bitmap(image, channel, plain=True)
     else:
-        value = as_color(job.convert(image), "albedo")
+        value = as_color(entity.job.convert(image), "albedo")
         if isinstance(value, BaseTexture) and (channel is not None or not isinstance(value, Texture)):
-            node.lose(f"a map by {image.plugin}")
+            entity.lose(f"a map by {image.type}")
             return material
         if not isinstance(value, Texture):
             value = Texture(np.broadcast_to(value, 3).astype(np.float32).reshape(1, 1, 3), channel=channel)
@@ -194,58 +195,58 @@ def _mapped(node: Node, job: Job, image: Node, make: Any, channel: Any) -> Mater
         return material  # steps have no slopes
     normal_map = make(texture)
     normal_map.folds_light = False
-    normal_map.shadows_grazing = node.flag("use_shadowing_function", True)
-    normal_map.mirrors_hidden = node.flag("flip_invalid_normals", True)
+    normal_map.shadows_grazing = entity.flag("use_shadowing_function", True)
+    normal_map.mirrors_hidden = entity.flag("flip_invalid_normals", True)
     if not normal_map.mirrors_hidden:
-        node.lose("flip_invalid_normals")
-    return job.changed(material, normal_map=normal_map)
+        entity.lose("flip_invalid_normals")
+    return entity.job.changed(material, normal_map=normal_map)
 
 
-def _ior(node: Node, name: str, default: str) -> float:
+def _ior(entity: Entity, name: str, default: str) -> float:
     """Return an index of refraction, given as a number or as the name of a material."""
 
     def read() -> float:
-        value = node.get(name, default)
+        value = entity.get(name, default)
         if isinstance(value, str):
             return INDICES[one_of(name, value.lower(), INDICES)]
         return number(name, value, lambda x: x > 0, "above 0")
 
-    return node.or_default(INDICES[default], read)
+    return entity.or_default(INDICES[default], read)
 
 
-def _relative_index(node: Node, job: Job) -> dict[str, Any]:
-    inside = "polypropylene" if "plastic" in node.plugin else "bk7"
-    return {"ior": _ior(node, "int_ior", inside) / _ior(node, "ext_ior", "air")}
+def _relative_index(entity: Entity) -> dict[str, Any]:
+    inside = "polypropylene" if "plastic" in entity.type else "bk7"
+    return {"ior": _ior(entity, "int_ior", inside) / _ior(entity, "ext_ior", "air")}
 
 
-def _facets(node: Node, job: Job) -> dict[str, Any]:
+def _facets(entity: Entity) -> dict[str, Any]:
     """Return the parameters of microfacets."""
-    both = "plastic" not in node.plugin and bool({"alpha_u", "alpha_v"} & node.values.keys())
+    both = "plastic" not in entity.type and bool({"alpha_u", "alpha_v"} & entity.values.keys())
     facets: dict[str, Any] = {
-        "roughness": roughness(node, "alpha_u" if both else "alpha", 0.1, job),
-        "distribution": node.choice("distribution", "beckmann", ("beckmann", "ggx")),
+        "roughness": roughness(entity, "alpha_u" if both else "alpha", 0.1),
+        "distribution": entity.choice("distribution", "beckmann", ("beckmann", "ggx")),
         "shadowing": "separable",
         "multiscatter": False,
     }
-    return facets | ({"roughness_v": roughness(node, "alpha_v", 0.1, job)} if both else {})
+    return facets | ({"roughness_v": roughness(entity, "alpha_v", 0.1)} if both else {})
 
 
-def _index_of_reflectance(node: Node, job: Job) -> dict[str, Any]:
+def _index_of_reflectance(entity: Entity) -> dict[str, Any]:
     """Return the index by specular, which is the normal reflectance over 0.08, where there is no eta."""
-    if "eta" in node.values:
+    if "eta" in entity.values:
         return {}
-    part = node.number("specular", 0.5, lambda x: 0 <= x <= 1, "in [0, 1]")
+    part = entity.number("specular", 0.5, lambda x: 0 <= x <= 1, "in [0, 1]")
     root = np.sqrt(0.08 * part)
     return {"ior": float((1 + root) / (1 - root))}
 
 
 # what a parameter, with others, becomes in a way of its own
-OTHERS: dict[str, Callable[[Node, Job], dict[str, Any]]] = {
+OTHERS: dict[str, Callable[[Entity], dict[str, Any]]] = {
     "int_ior": _relative_index,
     "distribution": _facets,
-    "eta": lambda node, job: {"ior": scalar(node, "eta", 1.5, job, "unbounded")},
+    "eta": lambda entity: {"ior": scalar(entity, "eta", 1.5, "unbounded")},
     "specular": _index_of_reflectance,
-    "nonlinear": lambda node, job: {"nonlinear": node.flag("nonlinear")},
+    "nonlinear": lambda entity: {"nonlinear": entity.flag("nonlinear")},
 }
 
 
@@ -264,15 +265,15 @@ def _model(
         parts = [word.partition(":") for word in words.split()]
         return [(names.partition("=")[0], names.rpartition("=")[2], float(to)) for names, _, to in parts]
 
-    def convert(node: Node, job: Job) -> Material:
-        found = {ours: color(node, theirs, default, job) for ours, theirs, default in split(colors)}
+    def convert(entity: Entity) -> Material:
+        found = {ours: color(entity, theirs, default) for ours, theirs, default in split(colors)}
         found |= {
-            ours: scalar(node, theirs, default, job, "unbounded" if theirs == "diff_trans" else "albedo")
+            ours: scalar(entity, theirs, default, "unbounded" if theirs == "diff_trans" else "albedo")
             for ours, theirs, default in split(numbers)
         }
         for each in others.split():
-            found |= OTHERS[each](node, job) if each in OTHERS else {}
-        return _named(node, make(**found))
+            found |= OTHERS[each](entity) if each in OTHERS else {}
+        return _named(entity, make(**found))
 
     read = [theirs for _, theirs, _ in split(f"{colors} {numbers}")]
     plugin(name, "bsdf", f"{' '.join(read)} {others}", harmless=harmless, note=note)(convert)
@@ -321,17 +322,17 @@ _model(
 )
 
 
-def is_one_sided(node: Node) -> bool:
+def is_one_sided(entity: Entity) -> bool:
     """Return whether the back of a BSDF is black."""
-    if node.plugin in ("mask", "bumpmap", "normalmap", "blendbsdf"):
-        return all(is_one_sided(part) for part in node.held("bsdf"))
-    if node.plugin == "principled":
-        passing = node.values.get("spec_trans", 0.0)
+    if entity.type in ("mask", "bumpmap", "normalmap", "blendbsdf"):
+        return all(is_one_sided(part) for part in entity.held("bsdf"))
+    if entity.type == "principled":
+        passing = entity.values.get("spec_trans", 0.0)
         return isinstance(passing, int | float) and passing == 0
-    return node.plugin in ONE_SIDED
+    return entity.type in ONE_SIDED
 
 
-def _sided(node: Node, job: Job) -> Bsdf:
+def _sided(entity: Entity) -> Bsdf:
     """Return the BSDF of a plugin, whose back is black where Mitsuba has it so."""
-    bsdf = _inner(node, job).bsdf
-    return Sides(bsdf) if is_one_sided(node) else bsdf
+    bsdf = _inner(entity).bsdf
+    return Sides(bsdf) if is_one_sided(entity) else bsdf

@@ -10,11 +10,12 @@ from ...camera import Sensors, SurfaceSensors
 from ...lights import Environment, Sky
 from ...scene import Scene
 from ..description.conversion import only_one, shown
+from ..description.entity import Entity
 from ..repair import RawMesh
 from ..sources import SceneFiles
 from . import bsdfs, emitters, shapes, textures  # noqa: F401  they fill the table
 from .media import medium_around
-from .nodes import Graph, Job, Node, plugin
+from .nodes import Graph, Job, plugin
 from .views import DEFAULT_FILM, check_clipping, meter_on, sees_media
 
 
@@ -50,7 +51,7 @@ def convert(
     """
     job = Job(name, files, find, read_mesh)
     job.instead["film"] = DEFAULT_FILM, "the default in its place"
-    made: Scene = job.convert(Graph(name, files.losses, version).build(scene))
+    made: Scene = job.convert(Graph(name, job, version).build(scene))
     return made
 
 
@@ -58,33 +59,33 @@ DEFINED = "bsdf texture sampler film rfilter medium phase volume"  # for others 
 
 
 @plugin("scene", "scene", "", f"shape emitter sensor integrator {DEFINED}", "allow_thread_reordering")
-def _scene(node: Node, job: Job) -> Scene:
-    parts = [part for part in node.held("shape") if part.plugin != "shapegroup"]
+def _scene(entity: Entity) -> Scene:
+    parts = [part for part in entity.held("shape") if part.type != "shapegroup"]
     carried = [(sensor, part) for part in parts for sensor in part.held("sensor")]
-    sensors = [(sensor, node) for sensor in node.held("sensor")] + carried
-    seen = [(*each, view) for each in sensors if (view := job.convert(each[0])) is not None]
+    sensors = [(sensor, entity) for sensor in entity.held("sensor")] + carried
+    seen = [(*each, view) for each in sensors if (view := entity.job.convert(each[0])) is not None]
     for sensor, *_ in seen[1:]:
-        node.lose(f"the further sensor {sensor.plugin!r}")
+        entity.lose(f"the further sensor {sensor.type!r}")
     camera, settings = seen[0][2] if seen else (None, {})
-    job.eye = None if camera is None else camera.origin
-    integrators = node.held("integrator")
-    job.sees_media = not integrators or sees_media(integrators[0])
-    followed = job.convert(integrators[0]) if integrators else {}
+    entity.job.eye = None if camera is None else camera.origin
+    integrators = entity.held("integrator")
+    entity.job.sees_media = not integrators or sees_media(integrators[0])
+    followed = entity.job.convert(integrators[0]) if integrators else {}
     measures, hides = bool(seen) and (camera is None or isinstance(camera, Sensors)), "background" in followed
-    job.hides_lamps = hides and not measures
+    entity.job.hides_lamps = hides and not measures
     if hides and measures:
-        node.lose("hide_emitters for a sensor that measures light")
-    found = [shape for part in parts for shape in job.convert(part)]
-    lamps = [part for part in node.held("emitter") if part.plugin != "area"]
-    made = [light for part in lamps if (light := job.convert(part)) is not None]
+        entity.lose("hide_emitters for a sensor that measures light")
+    found = [shape for part in parts for shape in entity.job.convert(part)]
+    lamps = [part for part in entity.held("emitter") if part.type != "area"]
+    made = [light for part in lamps if (light := entity.job.convert(part)) is not None]
     lights = [light for each in made for light in (each if isinstance(each, list) else [each])]
-    lights = only_one(lights, job.files.losses)
-    found = shown(found, lights, job.files.losses)
+    lights = only_one(lights, entity.job.files.losses)
+    found = shown(found, lights, entity.job.files.losses)
     settings = settings | followed
     if measures or (not hides and any(isinstance(light, Environment | Sky) for light in lights)):
         settings.pop("background", None)  # alpha is 1
     if seen and camera is None:
-        camera = _meter(*seen[0][:2], job)
+        camera = _meter(*seen[0][:2])
     elif seen and not measures:
         check_clipping(seen[0][0], camera, found)
     scene = Scene(
@@ -92,16 +93,16 @@ def _scene(node: Node, job: Job) -> Scene:
         lights,
         camera,
         settings=settings,
-        medium=medium_around(node, seen[0][0] if seen else None, job),
+        medium=medium_around(entity, seen[0][0] if seen else None),
     )
     if isinstance(camera, Sensors) and found:
         scene.camera = camera.above(scene.bounds)
     return scene
 
 
-def _meter(sensor: Node, place: Node, job: Job) -> SurfaceSensors | None:
+def _meter(sensor: Entity, place: Entity) -> SurfaceSensors | None:
     """Return what measures the irradiance on the shape that holds a sensor."""
-    meter = meter_on(job.convert(place)) if place.kind == "shape" else None
+    meter = meter_on(place.job.convert(place)) if place.kind == "shape" else None
     if meter is None:
         sensor.lose("left out, as it is at no mesh or sphere")
     return meter

@@ -22,9 +22,11 @@ from ...media import (
     Rayleigh,
 )
 from ...textures.base import BaseTexture
+from ..description.entity import Entity
 from ..volumes import parsed_grid
-from .nodes import Job, Node, plugin, unsupported
+from .nodes import plugin, unsupported
 from .textures import color
+from .transforms import plain, to_world
 
 
 @plugin(
@@ -34,49 +36,51 @@ from .textures import color
     "phase texture volume",
     "sample_emitters has_spectral_extinction",
 )
-def _homogeneous(node: Node, job: Job) -> Medium:
-    extinction, albedo = coefficient(node, "sigma_t", 1.0, job), coefficient(node, "albedo", 0.75, job)
+def _homogeneous(entity: Entity) -> Medium:
+    extinction, albedo = coefficient(entity, "sigma_t", 1.0), coefficient(entity, "albedo", 0.75)
     scattering = extinction * albedo
-    phase = phase_of(node, job)
-    return Medium(extinction - scattering, scattering, phase=phase, scale=node.number("scale", 1.0))
+    phase = phase_of(entity)
+    return Medium(extinction - scattering, scattering, phase=phase, scale=entity.number("scale", 1.0))
 
 
-def phase_of(node: Node, job: Job) -> PhaseFunction:
+def phase_of(entity: Entity) -> PhaseFunction:
     """Return the phase function that a medium holds; isotropic without one."""
-    found: list[PhaseFunction] = [job.convert(each) for each in node.held("phase")]
+    found: list[PhaseFunction] = [entity.job.convert(each) for each in entity.held("phase")]
     return found[0] if found else Isotropic()
 
 
-def coefficient(node: Node, name: str, default: float, job: Job) -> Doubles:
+def coefficient(entity: Entity, name: str, default: float) -> Doubles:
     """Return a coefficient of each channel, (3,), given as a number, a color or a constant volume."""
-    value = node.get(name, default)
-    if isinstance(value, Node) and value.kind == "volume":
-        value = None if value.plugin == "gridvolume" else job.convert(value)
+    value = entity.get(name, default)
+    if isinstance(value, Entity) and value.kind == "volume":
+        value = None if value.type == "gridvolume" else entity.job.convert(value)
     else:
-        value = color(node, name, default, job, "unbounded")
+        value = color(entity, name, default, "unbounded")
         if not isinstance(value, BaseTexture):
-            value = node.lost.within(name, value, 0.0, 1.0 if name == "albedo" else np.inf, node.label)
+            value = entity.lost.within(name, value, 0.0, 1.0 if name == "albedo" else np.inf, entity.label)
     if value is None or isinstance(value, BaseTexture):
-        node.lose(name)
+        entity.lose(name)
         value = default
     return np.broadcast_to(np.asarray(value, np.float64), 3)
 
 
 plugin("constvolume", "volume", "value to_world", "texture")(
-    lambda node, job: color(node, "value", 1.0, job, "unbounded")
+    lambda entity: color(entity, "value", 1.0, "unbounded")
 )
-plugin("isotropic", "phase")(lambda node, job: Isotropic())
-plugin("rayleigh", "phase")(lambda node, job: Rayleigh())
-plugin("hg", "phase", "g")(lambda node, job: HenyeyGreenstein(node.number("g", 0.8)))
+plugin("isotropic", "phase")(lambda entity: Isotropic())
+plugin("rayleigh", "phase")(lambda entity: Rayleigh())
+plugin("hg", "phase", "g")(lambda entity: HenyeyGreenstein(entity.number("g", 0.8)))
 
 
 @plugin("blendphase", "phase", "weight", "phase")
-def _blend(node: Node, job: Job) -> PhaseFunction:
-    first, second = [job.convert(each) for each in (*node.held("phase"), *[job.only(node, "phase")] * 2)][:2]
-    return PhaseMix(first, second, node.number("weight", 0.5))
+def _blend(entity: Entity) -> PhaseFunction:
+    first, second = [
+        entity.job.convert(each) for each in (*entity.held("phase"), *[entity.only("phase")] * 2)
+    ][:2]
+    return PhaseMix(first, second, entity.number("weight", 0.5))
 
 
-unsupported("sggx tabphase", "phase")
+unsupported("phase", "sggx tabphase")
 
 
 class Volume(NamedTuple):
@@ -89,15 +93,15 @@ class Volume(NamedTuple):
 @plugin(
     "gridvolume", "volume", "filename to_world use_grid_bbox filter_type wrap_mode", "", "raw accel max_value"
 )
-def _grid_volume(node: Node, job: Job) -> Volume:
-    path, matrix = job.find(node.text("filename")), node.matrix()
-    values, box = parsed_grid(os.fspath(path), job.files.read(path), job.files.budget)
-    if node.flag("use_grid_bbox"):
+def _grid_volume(entity: Entity) -> Volume:
+    path, matrix = entity.job.find(entity.text("filename")), to_world(entity)
+    values, box = parsed_grid(os.fspath(path), entity.job.files.read(path), entity.job.files.budget)
+    if entity.flag("use_grid_bbox"):
         matrix = matrix @ box
-    if node.choice("filter_type", "trilinear", ("trilinear", "nearest")) == "nearest":
-        node.lose("filter_type 'nearest'")
-    if node.choice("wrap_mode", "clamp", ("clamp", "repeat", "mirror")) != "clamp":
-        node.lose("wrap_mode")
+    if entity.choice("filter_type", "trilinear", ("trilinear", "nearest")) == "nearest":
+        entity.lose("filter_type 'nearest'")
+    if entity.choice("wrap_mode", "clamp", ("clamp", "repeat", "mirror")) != "clamp":
+        entity.lose("wrap_mode")
     return Volume(values.reshape(*values.shape[:3], -1), matrix)
 
 
@@ -108,82 +112,84 @@ def _grid_volume(node: Node, job: Job) -> Volume:
     "phase texture volume",
     "sample_emitters has_spectral_extinction majorant_grid_res majorant_resolution_factor",
 )
-def _heterogeneous(node: Node, job: Job) -> GridMedium:
-    extinction, albedo = _volume(node, "sigma_t", 1.0, job), _volume(node, "albedo", 0.75, job)
+def _heterogeneous(entity: Entity) -> GridMedium:
+    extinction, albedo = _volume(entity, "sigma_t", 1.0), _volume(entity, "albedo", 0.75)
     part = np.clip(albedo.values, 0, 1)
     density, color = extinction.values, np.ones(3)
     if density.size <= 3:
         density, color = np.ones((1, 1, 1)), np.broadcast_to(density.ravel(), 3)
     elif density.shape[3] == 1:
         density = density[..., 0]
-    more: dict[str, Any] = {"phase": phase_of(node, job), "scale": node.number("scale", 1.0)}
+    more: dict[str, Any] = {"phase": phase_of(entity), "scale": entity.number("scale", 1.0)}
     if part.size <= 3:
         part = np.broadcast_to(part.ravel(), 3)
         return GridMedium(density, extinction.matrix, color * (1 - part), color * part, **more)
     if not np.allclose(albedo.matrix, extinction.matrix):
-        node.lose("the place of albedo")
+        entity.lose("the place of albedo")
     part = np.broadcast_to(part, (*part.shape[:3], 3))
     density = density[..., None] * color if np.ptp(color) else density * color[0]
     return GridMedium(density, extinction.matrix, albedo=part, **more)
 
 
-def _volume(node: Node, name: str, default: float, job: Job) -> Volume:
+def _volume(entity: Entity, name: str, default: float) -> Volume:
     """Return a parameter that is a volume, or a number or a color, which are a volume of one voxel."""
-    value = node.get(name, default)
-    if isinstance(value, Node) and value.plugin == "gridvolume":
-        found: Volume | None = job.convert(value)
+    value = entity.get(name, default)
+    if isinstance(value, Entity) and value.type == "gridvolume":
+        found: Volume | None = entity.job.convert(value)
         if found is None:
             raise SceneError(f"{name} is no volume that can be read")
         return found
-    matrix = value.matrix() if isinstance(value, Node) and value.kind == "volume" else np.eye(4)
-    return Volume(coefficient(node, name, default, job).reshape(1, 1, 1, 3), matrix)
+    matrix = to_world(value) if isinstance(value, Entity) and value.kind == "volume" else np.eye(4)
+    return Volume(coefficient(entity, name, default).reshape(1, 1, 1, 3), matrix)
 
 
-def interior_of(node: Node, job: Job, hollow: bool) -> BaseMedium | None:
+def interior_of(entity: Entity, hollow: bool) -> BaseMedium | None:
     """Return the medium inside of a shape; None for none.
 
     A shape that has a medium outside alone is a hole in it, if it is `hollow`: if light passes its surface.
     """
-    if not job.sees_media:
+    if not entity.job.sees_media:
         return None
-    inside, outside = (_medium(node, name) for name in ("interior", "exterior"))
+    inside, outside = (_medium(entity, name) for name in ("interior", "exterior"))
     if inside is None:
-        return job.once("hole", lambda: Medium(0.0)) if hollow and outside is not None else None
-    return _made(inside, job)
+        return entity.job.once("hole", lambda: Medium(0.0)) if hollow and outside is not None else None
+    return _made(inside)
 
 
-def _medium(node: Node, name: str) -> Node | None:
-    value = node.values.get(name)
-    return value if isinstance(value, Node) and value.kind == "medium" else None
+def _medium(entity: Entity, name: str) -> Entity | None:
+    value = entity.values.get(name)
+    return value if isinstance(value, Entity) and value.kind == "medium" else None
 
 
-def _made(node: Node, job: Job) -> BaseMedium | None:
+def _made(entity: Entity) -> BaseMedium | None:
     """Return a medium; equal ones are one."""
-    made: BaseMedium | None = job.once(("medium", _content(node)), lambda: job.convert(node))
+    made: BaseMedium | None = entity.job.once(
+        ("medium", _content(entity)), lambda: entity.job.convert(entity)
+    )
     return made
 
 
 def _content(value: Any) -> Any:
     """Return what tells plugins with other parameters apart: neither names nor places."""
-    if isinstance(value, Node):
+    if isinstance(value, Entity):
         named = value.values.items()
         parts = [
-            (each.kind if isinstance(each, Node) and name.startswith("_arg") else name, each)
+            (each.kind if isinstance(each, Entity) and name.startswith("_arg") else name, each)
             for name, each in named
         ]
-        return value.plugin, tuple(sorted((name, repr(_content(each))) for name, each in parts))
-    value = getattr(value, "matrix", value)
+        return value.type, tuple(sorted((name, repr(_content(each))) for name, each in parts))
+    value = plain(value)
     return repr(value.tolist() if isinstance(value, np.ndarray) else value)
 
 
-def medium_around(node: Node, sensor: Node | None, job: Job) -> BaseMedium | None:
+def medium_around(entity: Entity, sensor: Entity | None) -> BaseMedium | None:
     """Return the medium of a scene: that around its sensor, unless this is inside of a shape.
 
     In a scene without a sensor it is the first one outside of a shape that is inside of none.
     """
-    if not job.sees_media:
+    if not entity.job.sees_media:
         return None
-    shapes = list(_shapes(node.held("shape")))
+    shapes = list(_shapes(entity.held("shape")))
     filled = [(each, medium) for each in shapes if (medium := _medium(each, "interior")) is not None]
     inside = [_content(medium) for _, medium in filled]
     outside = {repr(_content(each)): each for shape in shapes if (each := _medium(shape, "exterior"))}
@@ -196,21 +202,22 @@ def medium_around(node: Node, sensor: Node | None, job: Job) -> BaseMedium | Non
     for each in apart:
         if _content(each) != own:
             each.lose(what)
-    if around is None or any(_content(medium) == own and _holds(shape, job) for shape, medium in filled):
+    if around is None or any(_content(medium) == own and _holds(shape) for shape, medium in filled):
         return None
-    return _made(around, job)
+    return _made(around)
 
 
-def _holds(shape: Node, job: Job) -> bool:
+def _holds(shape: Entity) -> bool:
     """Return whether the camera is inside of a shape, as far as its bounds say."""
-    if job.eye is None or shape.plugin in ("shapegroup", "merge"):
+    if shape.job.eye is None or shape.type in ("shapegroup", "merge"):
         return False
-    boxes = [each.bounds for each in job.convert(shape)]
-    return any(bool(((job.eye > low) & (job.eye < high)).all()) for low, high in boxes)
+    eye = shape.job.eye
+    boxes = [each.bounds for each in shape.job.convert(shape)]
+    return any(bool(((eye > low) & (eye < high)).all()) for low, high in boxes)
 
 
-def _shapes(nodes: Iterable[Node]) -> Iterator[Node]:
+def _shapes(nodes: Iterable[Entity]) -> Iterator[Entity]:
     """Yield shapes, and those in groups."""
-    for node in nodes:
-        yield node
-        yield from _shapes(node.held("shape"))
+    for entity in nodes:
+        yield entity
+        yield from _shapes(entity.held("shape"))

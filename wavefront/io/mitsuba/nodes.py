@@ -1,20 +1,16 @@
-"""Plugins of a scene: their parameters, and the table of those that are converted."""
+"""Plugins of a scene, and the table of those that are converted."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from typing import Any, TypeVar
-
-import numpy as np
+from typing import Any
 
 from ...arrays.vec import Doubles
-from ...core.errors import LimitError, SceneError, finite_array, in_brief, one_of
+from ...core.errors import LimitError, SceneError, in_brief
 from ...core.suggestions import did_you_mean
-from ...shapes.transform import Matrix
-from ..description.conversion import Conversion, Part
-from ..description.placing import in_range
-from ..losses import Losses
+from ..description.conversion import Conversion
+from ..description.entity import C, Entity, Table
 from ..xml_checks import MAX_DEPTH
 
 COLORS = ("reflectance", "diffuse_reflectance", "base_color", "color", "albedo", "specular_reflectance")
@@ -23,141 +19,40 @@ SIZE = ("width", "height", "crop_width", "crop_height", "crop_offset_x", "crop_o
 MOST_PARTS = 4096  # plugins that a plugin is made of, each counted as often as it is referred to
 
 
-@dataclass(frozen=True)
-class Plugin:
-    """A plugin: how it is converted, and which of its parameters count."""
-
-    kind: str  # "shape", "bsdf", ...
-    convert: Callable[[Node, Job], Any] | None  # None: it is not supported
-    reads: tuple[str, ...] = ()  # parameters that are read
-    holds: tuple[str, ...] = ()  # kinds of plugins in it that are read, whatever their names
-    harmless: tuple[str, ...] = ()  # parameters that do not change the picture
-    note: str = ""  # what is different, for the documentation
-
-
-PLUGINS: dict[str, Plugin] = {}
-COMMON = {  # parameters of all plugins of a kind that do not change the picture
-    "emitter": ("sampling_weight",),
-    "shape": ("silhouette_sampling_weight",),
-    "integrator": ("timeout", "block_size", "samples_per_pass"),
-    "sensor": ("shutter_open", "shutter_close"),
-}
-C = TypeVar("C", bound=Callable[..., Any])
+TABLE = Table(
+    "Mitsuba",
+    harmless={
+        "emitter": "sampling_weight",
+        "shape": "silhouette_sampling_weight",
+        "integrator": "timeout block_size samples_per_pass",
+        "sensor": "shutter_open shutter_close",
+    },
+)
+unsupported = TABLE.unsupported
 
 
 def plugin(
     names: str, kind: str, reads: str = "", holds: str = "", harmless: str = "", note: str = ""
 ) -> Callable[[C], C]:
-    """Put a function that converts plugins into the table; each argument is a list of words."""
-
-    def add(convert: C) -> C:
-        ignored = (*harmless.split(), *COMMON.get(kind, ()))
-        for name in names.split():
-            PLUGINS[name] = Plugin(kind, convert, tuple(reads.split()), tuple(holds.split()), ignored, note)
-        return convert
-
-    return add
-
-
-def unsupported(names: str, kind: str) -> None:
-    """Put plugins into the table that Mitsuba has, and that are not supported."""
-    PLUGINS.update({name: Plugin(kind, None) for name in names.split()})
-
-
-@dataclass(eq=False)
-class Node(Part):
-    """A plugin of a scene with its parameters."""
-
-    plugin: str
-    id: str
-    label: str  # where it is, and what, for messages
-    values: dict[str, Any]
-    lost: Losses  # of all plugins
-    size: int = 1  # plugins in it
-
-    @property
-    def kind(self) -> str:  # type: ignore[override]
-        """What it is: a shape, a bsdf, ..."""
-        return PLUGINS[self.plugin].kind
-
-    def lose(self, what: str) -> None:
-        """Note something that is not honored."""
-        self.lost.note(what, self.label)
-
-    def get(self, name: str, default: Any = None) -> Any:
-        """Return a parameter, which the table must say is read."""
-        if name not in PLUGINS[self.plugin].reads:
-            raise KeyError(f"{self.plugin} does not read {name}")
-        return self.values.get(name, default)
-
-    def one(self, name: str, default: Any, *types: str) -> Any:
-        """Return a parameter; the format has no types."""
-        return self.get(name, default)
-
-    def choice(self, name: str, default: str, choices: tuple[str, ...]) -> str:
-        """Return one of some strings, in small letters."""
-        return self.or_default(default, lambda: str(one_of(name, self.text(name, default).lower(), choices)))
-
-    def matrix(self, name: str = "to_world") -> Matrix:
-        """Return a transform, (4, 4)."""
-        return self.or_default(np.eye(4), lambda: self._matrix(name))
-
-    def _matrix(self, name: str) -> Matrix:
-        value = self.get(name, np.eye(4))
-        matrix = finite_array(name, getattr(value, "matrix", value), (4, 4))
-        if not np.array_equal(matrix[3], [0, 0, 0, 1]):
-            if matrix[3, :3].any() or not matrix[3, 3] > 0:
-                raise SceneError(f"{name} has the last row {matrix[3].tolist()}; it must be [0, 0, 0, 1]")
-            self.lost.note(f"{name} has the last row", self.label, str(matrix[3].tolist()), "divided by it")
-            matrix = matrix / matrix[3, 3]
-        if not in_range(matrix[None])[0]:
-            raise SceneError(f"{name} has an element of size {np.abs(matrix).max():g}, which is too large")
-        return matrix
-
-    def held(self, kind: str) -> list[Node]:
-        """Return the plugins of a kind that it holds."""
-        return [value for value in self.values.values() if isinstance(value, Node) and value.kind == kind]
+    """Put a function that converts plugins into the table, which says all that counts of them."""
+    return TABLE.converts(kind, names, reads, holds, harmless, note)
 
 
 @dataclass
-class Job(Conversion[Node]):
+class Job(Conversion):
     """The conversion of one scene."""
 
+    table = TABLE
     eye: Doubles | None = None  # where the camera stands
     sees_media: bool = True  # whether the integrator does
     hides_lamps: bool = False  # whether it hides shapes that emit from the camera
 
-    def check(self, node: Node) -> None:
-        """Note the parameters of a plugin that are not read."""
-        entry = PLUGINS[node.plugin]
-        for name, value in node.values.items():
-            if name not in entry.reads and name not in entry.harmless:
-                if not isinstance(value, Node):
-                    node.lose(name)
-                elif value.kind not in entry.holds:
-                    node.lose(f"{value.kind} {name!r}")
-
-    def only(self, node: Node, kind: str) -> Node:
-        """Return the first plugin of a kind that a plugin must hold."""
-        held = node.held(kind)
-        if not held:
-            raise SceneError(f"{node.label} holds no {kind}")
-        return held[0]
-
-    def stand_in(self, node: Node) -> tuple[Callable[[], Any], str]:
+    def stand_in(self, part: Entity) -> tuple[Callable[[], Any], str]:
         """Return the bsdf that a damaged bsdf holds, or what the kind of a plugin has."""
-        held = node.held("bsdf") if node.kind == "bsdf" else []
+        held = part.held("bsdf") if part.kind == "bsdf" else []
         if held and held[0] not in self.making:
             return lambda: self.convert(held[0]), "the bsdf in it in its place"
-        return super().stand_in(node)
-
-    def converted(self, node: Node) -> Any:
-        """Return what becomes of a plugin."""
-        entry = PLUGINS[node.plugin]
-        if entry.convert is None:
-            return self.replaced(node, entry.kind)
-        self.check(node)
-        return entry.convert(node, self)
+        return super().stand_in(part)
 
 
 class Graph:
@@ -167,20 +62,21 @@ class Graph:
     ----------
     name
         What the dictionary is called in messages.
-    lost
-        As of `Node`.
+    job
+        The conversion of its plugins.
     version
         What is said of the version of its file.
     """
 
-    def __init__(self, name: str, lost: Losses, version: str = "") -> None:
-        self._name, self._lost, self._version = name, lost, version
+    def __init__(self, name: str, job: Job, version: str = "") -> None:
+        self._name, self._job, self._version = name, job, version
+        self._lost = job.files.losses
         self._ids: dict[str, Mapping[str, Any]] = {}
-        self._nodes: dict[int, Node] = {}
+        self._nodes: dict[int, Entity] = {}
         self._seen: set[int] = set()
         self._kept: dict[int, tuple[Mapping[str, Any], Any]] = {}  # in place of plugins that are unknown
 
-    def build(self, scene: Any) -> Node:
+    def build(self, scene: Any) -> Entity:
         """Return the node of a scene; plugins that are unknown or damaged are replaced or left out.
 
         Raises
@@ -209,7 +105,7 @@ class Graph:
             if isinstance(value, Mapping):
                 self._register(value, "" if _unnamed(name) else name, depth + 1)
 
-    def _node(self, source: Mapping[str, Any], path: str, key: str, above: tuple[int, ...]) -> Node:
+    def _node(self, source: Mapping[str, Any], path: str, key: str, above: tuple[int, ...]) -> Entity:
         place = getattr(source, "place", "") or path
         source = self._known(self._target(source, place), place)
         if id(source) in above:
@@ -218,12 +114,12 @@ class Graph:
             return self._nodes[id(source)]
         if len(above) > MAX_DEPTH:
             raise LimitError(f"{place}: plugins refer to each other over more than {MAX_DEPTH} levels")
-        kind: str = source["type"]
+        kind: str = source["type"]  # as it is called in messages
         own = source.get("id", key)
         own = own if isinstance(own, str) else ""
         label = f"{place}: {kind}" if place != path else f"{path} ({kind})"
         label += f" {own!r}" if own and (place != path or "id" in source) else ""
-        node = Node(kind, own, label, {}, self._lost)
+        node = Entity(TABLE.kinds[kind], kind, own, label, {}, self._job)
         for name, value in source.items():
             if name in ("type", "id"):
                 continue
@@ -240,6 +136,7 @@ class Graph:
                 f"{label}: stands for {node.size} plugins, as they refer to each other; "
                 f"the limit is {MOST_PARTS}"
             )
+        node.unread.update(node.values)
         self._nodes[id(source)] = node
         return node
 
@@ -265,10 +162,10 @@ class Graph:
             If that is nothing.
         """
         kind, kept = source.get("type"), id(source)
-        if isinstance(kind, str) and kind in PLUGINS:
+        if isinstance(kind, str) and kind in TABLE.kinds:
             return source
         if kept not in self._kept:
-            hint = did_you_mean(kind, PLUGINS) if isinstance(kind, str) else ""
+            hint = did_you_mean(kind, TABLE.kinds) if isinstance(kind, str) else ""
             what = f"there is no plugin {in_brief(kind)}{self._version}{hint}"
             self._kept[kept] = {"type": "diffuse"}, source  # where it holds itself
             made = self._substitute(source)
@@ -308,7 +205,7 @@ class Graph:
 def _kind(source: Mapping[str, Any]) -> str:
     """Return the kind of a plugin, of one that is unknown by its element."""
     kind = source.get("type")
-    return PLUGINS[kind].kind if isinstance(kind, str) and kind in PLUGINS else getattr(source, "tag", "")
+    return TABLE.kinds[kind] if isinstance(kind, str) and kind in TABLE.kinds else getattr(source, "tag", "")
 
 
 def _unnamed(name: Any) -> bool:

@@ -21,6 +21,7 @@ from ...textures.base import BaseTexture
 from ...textures.image import Texture
 from ..description.computed import computed
 from ..description.conversion import textures_in
+from ..description.entity import Entity
 from ..description.placing import facing, moved_raw
 from ..description.views import frame
 from ..joining import COLUMNS, stacked
@@ -30,9 +31,10 @@ from ..volumes import parsed_grid
 from .attributes import with_attribute
 from .bsdfs import FacingSides, is_one_sided
 from .media import interior_of
-from .nodes import PLUGINS, Job, Node, plugin, unsupported
+from .nodes import Job, plugin, unsupported
 from .serialized import read_serialized
 from .textures import upside_down
+from .transforms import to_world
 
 SIDES = 128  # of round shapes that are meshes
 ROUND = 1e-4  # relative difference of the scales along two axes that is taken for rounding
@@ -42,26 +44,26 @@ SURFACE, PARTS = "to_world flip_normals", "bsdf emitter medium sensor"
 
 
 @plugin("rectangle", "shape", SURFACE, PARTS)
-def _rectangle(node: Node, job: Job) -> list[Shape]:
+def _rectangle(entity: Entity) -> list[Shape]:
     corners = np.array([[-1.0, -1, 0], [1, -1, 0], [1, 1, 0], [-1, 1, 0]])
     faces = np.array([[0, 1, 2], [0, 2, 3]])
-    return _mesh(node, job, RawMesh("rectangle", corners, faces, uvs=(corners[:, :2] + 1) / 2))
+    return _mesh(entity, RawMesh("rectangle", corners, faces, uvs=(corners[:, :2] + 1) / 2))
 
 
 @plugin("cube", "shape", SURFACE, PARTS)
-def _cube(node: Node, job: Job) -> list[Shape]:
+def _cube(entity: Entity) -> list[Shape]:
     sides = ((1, 5, 4, 0), (3, 2, 6, 7), (1, 3, 7, 5), (5, 7, 6, 4), (4, 6, 2, 0), (3, 1, 0, 2))
     number = np.array(sides).reshape(-1)  # of a corner: a bit for each axis
     corners = np.stack([number & 1, number >> 1 & 1, number >> 2], 1) * 2.0 - 1
     faces = np.array([[0, 1, 2], [0, 2, 3]]) + 4 * np.arange(6)[:, None, None]
     uvs = np.tile([[0.0, 1], [1, 1], [1, 0], [0, 0]], (6, 1))
-    raw, (low, high) = RawMesh("cube", corners, faces.reshape(-1, 3), uvs=uvs), _box(node.matrix())
-    outside = job.eye is None or bool(((job.eye < low) | (job.eye > high)).any())
-    return _mesh(node, job, raw, closed=outside)
+    raw, (low, high) = RawMesh("cube", corners, faces.reshape(-1, 3), uvs=uvs), _box(to_world(entity))
+    outside = entity.job.eye is None or bool(((entity.job.eye < low) | (entity.job.eye > high)).any())
+    return _mesh(entity, raw, closed=outside)
 
 
 @plugin("disk", "shape", SURFACE, PARTS, note="a mesh of 128 triangles")
-def _disk(node: Node, job: Job) -> list[Shape]:
+def _disk(entity: Entity) -> list[Shape]:
     ring, turns = _ring(np.sqrt(2 * np.pi / SIDES / sin_cos_turns(np.array([1 / SIDES]))[0][0]))
     count = np.arange(SIDES)
     flat = np.hstack([ring, np.zeros((SIDES + 1, 1))])
@@ -70,7 +72,7 @@ def _disk(node: Node, job: Job) -> list[Shape]:
         [np.stack([np.ones(SIDES + 1), turns], 1), np.stack([np.zeros(SIDES), turns[:-1] + 0.5 / SIDES], 1)]
     )
     faces = np.stack([SIDES + 1 + count, count, count + 1], 1)
-    return _mesh(node, job, RawMesh("disk", vertices, faces, uvs=uvs))
+    return _mesh(entity, RawMesh("disk", vertices, faces, uvs=uvs))
 
 
 @plugin(
@@ -80,19 +82,19 @@ def _disk(node: Node, job: Job) -> list[Shape]:
     PARTS,
     note="a mesh where it shines, is textured or elliptic",
 )
-def _cylinder(node: Node, job: Job) -> list[Shape]:
-    start, end = node.vector("p0", (0, 0, 0)), node.vector("p1", (0, 0, 1))
-    radius = node.number("radius", 1.0, lambda x: x > 0, "above 0")
+def _cylinder(entity: Entity) -> list[Shape]:
+    start, end = entity.vector("p0", (0, 0, 0)), entity.vector("p1", (0, 0, 1))
+    radius = entity.number("radius", 1.0, lambda x: x > 0, "above 0")
     if not (end - start).any():
         raise SceneError(f"p0 and p1 are both {start.tolist()}")
-    axes, matrix = frame(end - start), node.matrix()
-    material, emission = _appearance(node, job)
+    axes, matrix = frame(end - start), to_world(entity)
+    material, emission = _appearance(entity)
     around = np.linalg.norm(matrix[:3, :3] @ axes[:, :2], axis=0)
-    needs_faces = emission is not None or node.held("sensor") or node.flag("flip_normals")
+    needs_faces = emission is not None or entity.held("sensor") or entity.flag("flip_normals")
     even = abs(around[1] - around[0]) <= ROUND * around[0]
     if even and not needs_faces and not textures_in(material, Texture) and not _has_grain(material):
         ends = np.stack([start, end]) @ matrix[:3, :3].T + matrix[:3, 3]
-        size, name = radius * around[0], node.id or "cylinders"
+        size, name = radius * around[0], entity.name or "cylinders"
         return [Cylinders(ends[:1], ends[1:], size, caps=False, material=material, name=name)]
     ring, turns = _ring(1.0)
     across = ring @ axes[:, :2].T
@@ -101,28 +103,28 @@ def _cylinder(node: Node, job: Job) -> list[Shape]:
     k = np.arange(SIDES)
     low, high = (k, k + 1), (k + SIDES + 1, k + SIDES + 2)
     faces = np.stack([low[0], low[1], high[1], low[0], high[1], high[0]], 1).reshape(-1, 3)
-    return _mesh(node, job, RawMesh("cylinder", vertices, faces, np.tile(across, (2, 1)), uvs))
+    return _mesh(entity, RawMesh("cylinder", vertices, faces, np.tile(across, (2, 1)), uvs))
 
 
 @plugin(
     "sphere", "shape", f"{SURFACE} center radius", PARTS, note="one radius; a mesh where its front is inside"
 )
-def _sphere(node: Node, job: Job) -> list[Shape]:
-    center = node.vector("center", (0, 0, 0))
-    radius = node.number("radius", 1.0, lambda x: x > 0, "above 0")
-    matrix = node.matrix()
+def _sphere(entity: Entity) -> list[Shape]:
+    center = entity.vector("center", (0, 0, 0))
+    radius = entity.number("radius", 1.0, lambda x: x > 0, "above 0")
+    matrix = to_world(entity)
     scale = np.linalg.svd(matrix[:3, :3], compute_uv=False)
     if scale[0] - scale[2] > ROUND * scale[0]:
-        node.lose("to_world, which scales unevenly")
+        entity.lose("to_world, which scales unevenly")
     mirrored = bool(np.linalg.det(matrix[:3, :3]) < 0)
-    inward = node.flag("flip_normals") != mirrored  # a reflection turns the normals, but of no other shape
+    inward = entity.flag("flip_normals") != mirrored  # a reflection turns the normals, but of no other shape
     center = matrix[:3, :3] @ center + matrix[:3, 3]
     radius *= float(np.linalg.norm(matrix[:3, 0]))
-    closed = job.eye is None or bool(np.linalg.norm(job.eye - center) > radius)
-    material, emission = _appearance(node, job, closed and not inward)
+    closed = entity.job.eye is None or bool(np.linalg.norm(entity.job.eye - center) > radius)
+    material, emission = _appearance(entity, closed and not inward)
     turn = None
     if {"uv", "tangent_frame"} & _reads((material, emission)):
-        material, emission = _for_spheres(material, emission, job)
+        material, emission = _for_spheres(material, emission, entity.job)
         left, _, right = np.linalg.svd(matrix[:3, :3])
         turn = left @ right @ POLES
     improper = turn is not None and mirrored
@@ -132,105 +134,106 @@ def _sphere(node: Node, job: Job) -> list[Shape]:
         material=material,
         emission=emission,
         transform=None if improper else turn,
-        name=node.id or "sphere",
+        name=entity.name or "sphere",
     )
     if not (inward or improper or (emission is not None and material.opacity is not None)):
         return [made]
     raw = facing(ball(made, turn), reverse=inward)
     raw = replace(raw, name=made.name, material=material, emission=emission)
-    mesh = build(job.name, raw, job.files.losses)
+    mesh = build(entity.job.name, raw, entity.job.files.losses)
     return [] if mesh is None else [mesh]
 
 
 @plugin("obj ply", "shape", f"{SURFACE} filename face_normals flip_tex_coords", PARTS)
-def _file(node: Node, job: Job) -> list[Shape]:
-    path = job.find(node.text("filename"))
-    raw = job.once(path, lambda: _one(str(path), job.read_mesh(path)))
-    raw = with_attribute(job.name, replace(raw), node)
-    if node.flag("flip_tex_coords", node.plugin == "obj") and raw.uvs is not None:
+def _file(entity: Entity) -> list[Shape]:
+    path = entity.job.find(entity.text("filename"))
+    raw = entity.job.once(path, lambda: _one(str(path), entity.job.read_mesh(path)))
+    raw = with_attribute(entity.job.name, replace(raw), entity)
+    if entity.flag("flip_tex_coords", entity.type == "obj") and raw.uvs is not None:
         raw = replace(raw, uvs=raw.uvs * (1, -1) + (0, 1))
-    return _mesh(node, job, replace(raw, name=path.stem), of_file=True)
+    return _mesh(entity, replace(raw, name=path.stem), of_file=True)
 
 
 @plugin("serialized", "shape", f"{SURFACE} filename shape_index face_normals", PARTS, note="versions 3 and 4")
-def _serialized(node: Node, job: Job) -> list[Shape]:
-    path = job.find(node.text("filename"))
-    key = (path, node.whole("shape_index", 0))
-    data = job.once(path, lambda: job.files.read(path))
-    raw = job.once(key, lambda: read_serialized(str(path), data, key[1], job.files))
-    return _mesh(node, job, raw, of_file=True)
+def _serialized(entity: Entity) -> list[Shape]:
+    path = entity.job.find(entity.text("filename"))
+    key = (path, entity.whole("shape_index", 0))
+    data = entity.job.once(path, lambda: entity.job.files.read(path))
+    raw = entity.job.once(key, lambda: read_serialized(str(path), data, key[1], entity.job.files))
+    return _mesh(entity, raw, of_file=True)
 
 
 @plugin("sdfgrid", "shape", "to_world filename grid normals", PARTS)
-def _distance_grid(node: Node, job: Job) -> list[Shape]:
-    if "filename" in node.values:
-        path = job.find(node.text("filename"))
-        values, _ = parsed_grid(os.fspath(path), job.files.read(path), job.files.budget)
+def _distance_grid(entity: Entity) -> list[Shape]:
+    if "filename" in entity.values:
+        path = entity.job.find(entity.text("filename"))
+        values, _ = parsed_grid(os.fspath(path), entity.job.files.read(path), entity.job.files.budget)
     else:
-        values = as_array("grid", node.get("grid"))
+        values = as_array("grid", entity.get("grid"))
         if values.ndim != 4 or values.shape[3] != 1:
             raise SceneError(f"grid has shape {values.shape}; it must have shape (z, y, x, 1)")
         values = values[..., 0]
-    material, emission = _appearance(node, job)
+    material, emission = _appearance(entity)
     if emission is not None:
         raise SceneError("has an area light; it cannot emit light")
-    smooth = node.choice("normals", "smooth", ("analytic", "smooth")) == "smooth"
-    name = node.id or "sdfgrid"
-    return [SignedDistanceGrid(values, node.matrix(), smooth=smooth, material=material, name=name)]
+    smooth = entity.choice("normals", "smooth", ("analytic", "smooth")) == "smooth"
+    name = entity.name or "sdfgrid"
+    return [SignedDistanceGrid(values, to_world(entity), smooth=smooth, material=material, name=name)]
 
 
 @plugin("shapegroup merge", "shape", holds="shape")
-def _group(node: Node, job: Job) -> list[Shape]:
+def _group(entity: Entity) -> list[Shape]:
     """Return its shapes, which are placed by instances."""
-    for sensor in (sensor for part in node.held("shape") for sensor in part.held("sensor")):
+    for sensor in (sensor for part in entity.held("shape") for sensor in part.held("sensor")):
         sensor.lose("left out, as it is in a group")
-    return [shape for part in node.held("shape") for shape in job.convert(part)]
+    return [shape for part in entity.held("shape") for shape in entity.job.convert(part)]
 
 
 @plugin("instance", "shape", "to_world", holds="shape")
-def _instance(node: Node, job: Job) -> list[Shape]:
-    group, matrix = job.only(node, "shape"), node.matrix()
-    if group.plugin != "shapegroup":
-        raise SceneError(f"holds a {group.plugin}; it must be a shapegroup")
+def _instance(entity: Entity) -> list[Shape]:
+    group, matrix = entity.only("shape"), to_world(entity)
+    if group.type != "shapegroup":
+        raise SceneError(f"holds a {group.type}; it must be a shapegroup")
+    job = entity.job
     shapes = job.convert(group)
     if not is_even(matrix[None], EVEN):
         shapes = job.once((group, "meshes"), lambda: as_meshes(shapes, job.name, job.files.losses))
     job.count_instances(len(shapes))
-    return list(Group(shapes).placed(matrix, name=node.id or None))
+    return list(Group(shapes).placed(matrix, name=entity.name or None))
 
 
-unsupported("blender bsplinecurve linearcurve ellipsoids ellipsoidsmesh", "shape")
+unsupported("shape", "blender bsplinecurve linearcurve ellipsoids ellipsoidsmesh")
 
 
-def _mesh(node: Node, job: Job, raw: RawMesh, of_file: bool = False, closed: bool = False) -> list[Shape]:
+def _mesh(entity: Entity, raw: RawMesh, of_file: bool = False, closed: bool = False) -> list[Shape]:
     """Return a mesh where to_world places it; that of a file has normals, unless face_normals is set."""
     with np.errstate(over="ignore", invalid="ignore"):
-        raw = _of_file(node, raw) if of_file else moved_raw(raw, node.matrix())
-    if node.flag("flip_normals"):
+        raw = _of_file(entity, raw) if of_file else moved_raw(raw, to_world(entity))
+    if entity.flag("flip_normals"):
         normals = None if raw.normals is None else -raw.normals
         raw = replace(raw, faces=raw.faces[:, ::-1], normals=normals)
-    job.count(raw.faces)
-    material, emission = _appearance(node, job, closed, of_file and raw.normals is not None)
+    entity.job.count(raw.faces)
+    material, emission = _appearance(entity, closed, of_file and raw.normals is not None)
     if raw.uvs is None and {"uv", "tangent_frame"} & _reads((material, emission)):
         raw = _with_coordinates(raw)
-    name = node.id or raw.name
+    name = entity.name or raw.name
     raw = replace(raw, name=name, material=material, emission=emission)
-    mesh = build(job.name, raw, job.files.losses)
+    mesh = build(entity.job.name, raw, entity.job.files.losses)
     return [] if mesh is None else [mesh]
 
 
-def _of_file(node: Node, raw: RawMesh) -> RawMesh:
+def _of_file(entity: Entity, raw: RawMesh) -> RawMesh:
     """Return a mesh of a file where to_world places it.
 
     Its front is where its normals point, and else where its faces do: then a reflection turns it.
     """
-    if node.flag("face_normals"):
+    if entity.flag("face_normals"):
         raw = replace(raw, normals=None)
-    moved = replace(moved_raw(raw, node.matrix()), tangents=None)
+    moved = replace(moved_raw(raw, to_world(entity)), tangents=None)
     if moved.normals is not None:
         return facing(moved, reverse=False)
     moved.faces = raw.faces
-    if not node.flag("face_normals"):
+    if not entity.flag("face_normals"):
         moved.normals = angle_normals(moved.vertices, moved.faces)
     return moved
 
@@ -266,33 +269,33 @@ def _has_grain(material: Material) -> bool:
     return "tangent_frame" in _reads(material)
 
 
-def _appearance(node: Node, job: Job, closed: bool = False, bent: bool = False) -> tuple[Material, Any]:
+def _appearance(entity: Entity, closed: bool = False, bent: bool = False) -> tuple[Material, Any]:
     """Return the material and the emission of a shape; `bent` where it has normals other than its own."""
-    bsdfs, emitters = node.held("bsdf"), node.held("emitter")
+    bsdfs, emitters = entity.held("bsdf"), entity.held("emitter")
     for extra in (*bsdfs[1:], *emitters[1:]):
-        node.lose(f"a second {extra.kind}")
+        entity.lose(f"a second {extra.kind}")
     emission = None
-    if emitters and PLUGINS[emitters[0].plugin].convert is not None and emitters[0].plugin != "area":
-        node.lose(f"the emitter {emitters[0].plugin!r}, which is no area light")
+    if emitters and emitters[0].maker.convert is not None and emitters[0].type != "area":
+        entity.lose(f"the emitter {emitters[0].type!r}, which is no area light")
     elif emitters:
-        emission = job.convert(emitters[0])
+        emission = entity.job.convert(emitters[0])
     if not bsdfs:
-        material = job.made.setdefault(not emitters, Material(Diffuse(0 if emitters else 0.5)))
+        material = entity.job.made.setdefault(not emitters, Material(Diffuse(0 if emitters else 0.5)))
         one_sided = not emitters
     else:
-        material, one_sided = job.convert(bsdfs[0]), is_one_sided(bsdfs[0])
-    interior = interior_of(node, job, hollow=material.alpha is not None)
+        material, one_sided = entity.job.convert(bsdfs[0]), is_one_sided(bsdfs[0])
+    interior = interior_of(entity, hollow=material.alpha is not None)
     if emission is not None and material.alpha is not None:
         alpha, emission = _shining(material.alpha, emission)
-        material = job.changed(material, alpha=alpha)
+        material = entity.job.changed(material, alpha=alpha)
     if interior is not None:
-        material = job.changed(material, interior=interior)
+        material = entity.job.changed(material, interior=interior)
     if one_sided and not (closed and material.alpha is None):
         kind = FacingSides if bent else Sides
-        bsdf = job.once((id(material.bsdf), kind), lambda: kind(material.bsdf))
-        material = job.changed(material, bsdf=bsdf)
-    if emitters and job.hides_lamps:
-        material = job.changed(material, visible_to_camera=False)
+        bsdf = entity.job.once((id(material.bsdf), kind), lambda: kind(material.bsdf))
+        material = entity.job.changed(material, bsdf=bsdf)
+    if emitters and entity.job.hides_lamps:
+        material = entity.job.changed(material, visible_to_camera=False)
     return material, emission
 
 

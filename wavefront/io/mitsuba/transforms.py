@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
+from typing import Any
 
 import numpy as np
 
-from ...core.errors import SceneError
+from ...core.errors import SceneError, finite_array
 from ...shapes.transform import Matrix, rotation, translation
+from ..description.entity import Entity
+from ..description.placing import in_range
 from ..description.views import looking
 from ..text_lines import numbers
 
@@ -39,6 +42,29 @@ def product(steps: list[tuple[str, Attributes, str]]) -> Matrix:
             matrix = operation(place, given) @ matrix
     if not np.isfinite(matrix).all():
         raise SceneError(f"{steps[-1][2]}: the transform is not finite")
+    return matrix
+
+
+def to_world(entity: Entity) -> Matrix:
+    """Return the transform of a plugin, (4, 4)."""
+    return entity.or_default(np.eye(4), lambda: _checked(entity, "to_world"))
+
+
+def plain(value: Any) -> Any:
+    """Return the array of a transform of Mitsuba; all else as it is."""
+    return value if isinstance(value, Entity) else getattr(value, "matrix", value)
+
+
+def _checked(entity: Entity, name: str) -> Matrix:
+    value = entity.get(name, np.eye(4))
+    matrix = finite_array(name, plain(value), (4, 4))
+    if not np.array_equal(matrix[3], [0, 0, 0, 1]):
+        if matrix[3, :3].any() or not matrix[3, 3] > 0:
+            raise SceneError(f"{name} has the last row {matrix[3].tolist()}; it must be [0, 0, 0, 1]")
+        entity.lost.note(f"{name} has the last row", entity.label, str(matrix[3].tolist()), "divided by it")
+        matrix = matrix / matrix[3, 3]
+    if not in_range(matrix[None])[0]:
+        raise SceneError(f"{name} has an element of size {np.abs(matrix).max():g}, which is too large")
     return matrix
 
 

@@ -12,9 +12,11 @@ from ...camera.projection import Orthographic, Perspective, Projection
 from ...core.errors import SceneError, number
 from ...sampling.filters import BoxFilter, GaussianFilter, TentFilter
 from ...shapes import Instance, Mesh, Shape, Sphere
+from ..description.entity import Entity
 from ..description.views import angle_of, half_tangent
 from ..text_lines import numbers
-from .nodes import Job, Node, plugin, unsupported
+from .nodes import plugin, unsupported
+from .transforms import to_world
 
 Settings = dict[str, Any]
 Crop = tuple[int, int, int, int] | None
@@ -39,54 +41,54 @@ LENS = f"{FIELD_OF_VIEW} principal_point_offset_x principal_point_offset_y"
 @plugin("perspective", "sensor", f"{CLIPPED} {LENS}", HELD, "focus_distance", NO_CLIPPING)
 @plugin("thinlens", "sensor", f"{CLIPPED} aperture_radius focus_distance {LENS}", HELD, note=NO_CLIPPING)
 @plugin("orthographic", "sensor", CLIPPED, HELD, "focus_distance", NO_CLIPPING)
-def _sensor(node: Node, job: Job) -> tuple[Camera, Settings]:
-    size, crop, settings = _picture(node, job)
-    matrix = node.matrix()
+def _sensor(entity: Entity) -> tuple[Camera, Settings]:
+    size, crop, settings = _picture(entity)
+    matrix = to_world(entity)
     axes, origin, aspect = matrix[:3, :3], matrix[:3, 3], size[0] / size[1]
     scale = np.linalg.norm(axes, axis=0)
     if not scale.all():
         raise SceneError(f"to_world is singular: {matrix.tolist()}")
     lens: Projection
-    if node.plugin == "orthographic":
+    if entity.type == "orthographic":
         lens = Orthographic(2 * scale[0] / aspect)
-        origin = origin + axes[:, 2] * node.number("near_clip", 1e-2)
+        origin = origin + axes[:, 2] * entity.number("near_clip", 1e-2)
         if abs(scale[1] / scale[0] - 1) > 1e-5:
-            node.lose("pixels that are not square")
+            entity.lose("pixels that are not square")
     else:
-        lens = _lens(node, aspect)
+        lens = _lens(entity, aspect)
     axes = axes / scale * (-1, 1, -1)  # Mitsuba's x points left, and z ahead
     if np.linalg.det(axes) < 0:
-        node.lose("the reflection in to_world")
+        entity.lose("the reflection in to_world")
         axes = axes * (-1, 1, 1)
     return Camera(origin, axes, lens, size, crop), settings
 
 
-def _picture(node: Node, job: Job) -> tuple[tuple[int, int], Crop, Settings]:
+def _picture(entity: Entity) -> tuple[tuple[int, int], Crop, Settings]:
     """Return the size, the crop and the settings of the picture of a sensor."""
-    film = node.held("film")
-    size, crop, settings = job.convert(film[0]) if film else DEFAULT_FILM
-    for sampler in node.held("sampler"):
-        settings = settings | job.convert(sampler)
+    film = entity.held("film")
+    size, crop, settings = entity.job.convert(film[0]) if film else DEFAULT_FILM
+    for sampler in entity.held("sampler"):
+        settings = settings | entity.job.convert(sampler)
     return size, crop, settings
 
 
-def _meter_settings(node: Node, job: Job) -> Settings:
+def _meter_settings(entity: Entity) -> Settings:
     """Return the settings of a sensor that is no camera: only the light of the scene counts."""
-    return _picture(node, job)[2] | {"filter": "box", "lighting": None}
+    return _picture(entity)[2] | {"filter": "box", "lighting": None}
 
 
 @plugin("radiancemeter", "sensor", "to_world origin direction", HELD, note=METER)
-def _radiance_meter(node: Node, job: Job) -> tuple[Camera, Settings]:
-    origin, direction = node.matrix()[:3, [3, 2]].T
-    if "to_world" not in node.values and {"origin", "direction"} & node.values.keys():
-        origin, direction = node.vector("origin", None), node.vector("direction", None)
-    return Sensors(origin[None], direction, "radiance"), _meter_settings(node, job)
+def _radiance_meter(entity: Entity) -> tuple[Camera, Settings]:
+    origin, direction = to_world(entity)[:3, [3, 2]].T
+    if "to_world" not in entity.values and {"origin", "direction"} & entity.values.keys():
+        origin, direction = entity.vector("origin", None), entity.vector("direction", None)
+    return Sensors(origin[None], direction, "radiance"), _meter_settings(entity)
 
 
 @plugin("irradiancemeter", "sensor", "", "film sampler", note=f"of a mesh or sphere; {METER}")
-def _irradiance_meter(node: Node, job: Job) -> tuple[None, Settings]:
+def _irradiance_meter(entity: Entity) -> tuple[None, Settings]:
     """Return its settings; where it is, its shape says."""
-    return None, _meter_settings(node, job)
+    return None, _meter_settings(entity)
 
 
 def meter_on(shapes: Sequence[Shape]) -> SurfaceSensors | None:
@@ -104,22 +106,22 @@ def meter_on(shapes: Sequence[Shape]) -> SurfaceSensors | None:
 
 @plugin("specfilm", "film", FILM, "rfilter", UNSEEN)
 @plugin("hdrfilm", "film", f"{FILM} pixel_format", "rfilter", UNSEEN, "luminance and xyz become rgb")
-def _film(node: Node, job: Job) -> tuple[tuple[int, int], Crop, Settings]:
-    width, height = node.whole("width", 768, 1), node.whole("height", 576, 1)
-    left, top = node.whole("crop_offset_x", 0), node.whole("crop_offset_y", 0)
-    right, bottom = left + node.whole("crop_width", width, 1), top + node.whole("crop_height", height, 1)
+def _film(entity: Entity) -> tuple[tuple[int, int], Crop, Settings]:
+    width, height = entity.whole("width", 768, 1), entity.whole("height", 576, 1)
+    left, top = entity.whole("crop_offset_x", 0), entity.whole("crop_offset_y", 0)
+    right, bottom = left + entity.whole("crop_width", width, 1), top + entity.whole("crop_height", height, 1)
     if not (left < width and top < height and right <= width and bottom <= height):
-        node.lose(
+        entity.lose(
             f"the crop {[left, top, right, bottom]}, where it is outside of its {width} × {height} pixels"
         )
         left, top = (left, top) if left < width and top < height else (0, 0)
         right, bottom = min(right, width), min(bottom, height)
     whole = (left, top, right, bottom) == (0, 0, width, height)
-    filters = node.held("rfilter")
-    settings = dict(job.convert(filters[0]) if filters else USUAL)
-    pixels = "rgb" if node.plugin == "specfilm" else node.choice("pixel_format", "rgb", PIXELS)
+    filters = entity.held("rfilter")
+    settings = dict(entity.job.convert(filters[0]) if filters else USUAL)
+    pixels = "rgb" if entity.type == "specfilm" else entity.choice("pixel_format", "rgb", PIXELS)
     if not pixels.startswith("rgb"):
-        node.lose(f"pixel_format {pixels!r}; its colors are rgb")
+        entity.lose(f"pixel_format {pixels!r}; its colors are rgb")
     if pixels.endswith("a"):
         settings["background"] = "transparent"
     return (width, height), None if whole else (left, top, right, bottom), settings
@@ -127,16 +129,16 @@ def _film(node: Node, job: Job) -> tuple[tuple[int, int], Crop, Settings]:
 
 @plugin("box", "rfilter", "radius")
 @plugin("tent", "rfilter", "radius")
-def _filter(node: Node, job: Job) -> Settings:
-    kind = BoxFilter if node.plugin == "box" else TentFilter
-    radius = node.number("radius", kind.radius)
-    return {"filter": node.plugin if radius == kind.radius else kind(radius)}
+def _filter(entity: Entity) -> Settings:
+    kind = BoxFilter if entity.type == "box" else TentFilter
+    radius = entity.number("radius", kind.radius)
+    return {"filter": entity.type if radius == kind.radius else kind(radius)}
 
 
 @plugin("gaussian", "rfilter", "stddev radius", note="ends at four times stddev")
-def _gaussian(node: Node, job: Job) -> Settings:
-    stddev = node.number("stddev", 0.5)
-    return {"filter": GaussianFilter(node.number("radius", 4 * stddev), stddev, windowed=True)}
+def _gaussian(entity: Entity) -> Settings:
+    stddev = entity.number("stddev", 0.5)
+    return {"filter": GaussianFilter(entity.number("radius", 4 * stddev), stddev, windowed=True)}
 
 
 @plugin(
@@ -146,8 +148,8 @@ def _gaussian(node: Node, job: Job) -> Settings:
     harmless="seed jitter strength",
     note="its sample_count counts, its pattern does not",
 )
-def _sampler(node: Node, job: Job) -> Settings:
-    return {"spp": node.whole("sample_count", 4, 1)} if "sample_count" in node.values else {}
+def _sampler(entity: Entity) -> Settings:
+    return {"spp": entity.whole("sample_count", 4, 1)} if "sample_count" in entity.values else {}
 
 
 @plugin(
@@ -161,36 +163,36 @@ def _sampler(node: Node, job: Job) -> Settings:
 @plugin("path volpath volpathmis ptracer prb", "integrator", "max_depth rr_depth hide_emitters")
 @plugin("direct", "integrator", "hide_emitters", harmless="shading_samples emitter_samples bsdf_samples")
 @plugin("moment aov", "integrator", "", "integrator", "aovs hide_emitters", "that in it counts")
-def _integrator(node: Node, job: Job) -> Settings:
-    if node.plugin in ("moment", "aov"):
-        return dict(job.convert(job.only(node, "integrator")))
+def _integrator(entity: Entity) -> Settings:
+    if entity.type in ("moment", "aov"):
+        return dict(entity.job.convert(entity.only("integrator")))
     settings: Settings = {"max_bounces": 1}
-    if node.plugin != "direct":
-        depth = node.number("max_depth", -1, lambda x: x == int(x) >= -1, "at least 0, or -1")
+    if entity.type != "direct":
+        depth = entity.number("max_depth", -1, lambda x: x == int(x) >= -1, "at least 0, or -1")
         settings["max_bounces"] = min(int(depth) - 1, ENDLESS) if depth > 0 else ENDLESS
-        settings["roulette"] = node.whole("rr_depth", 5, 1)
+        settings["roulette"] = entity.whole("rr_depth", 5, 1)
         if depth == 0:
-            node.lose("max_depth 0")
+            entity.lose("max_depth 0")
             settings["max_bounces"] = 0
-    if node.flag("hide_emitters"):
+    if entity.flag("hide_emitters"):
         settings["background"] = "transparent"
     return settings
 
 
-def sees_media(integrator: Node) -> bool:
+def sees_media(integrator: Entity) -> bool:
     """Return whether an integrator sees media: those that follow paths from surface to surface do not."""
-    return integrator.plugin not in SURFACES and all(map(sees_media, integrator.held("integrator")))
+    return integrator.type not in SURFACES and all(map(sees_media, integrator.held("integrator")))
 
 
-unsupported("depth stokes emission_reparam volprim_rf_basic", "integrator")
-unsupported("catmullrom lanczos mitchell", "rfilter")
-unsupported("batch distant flat_sensor", "sensor")
+unsupported("integrator", "depth stokes emission_reparam volprim_rf_basic")
+unsupported("rfilter", "catmullrom lanczos mitchell")
+unsupported("sensor", "batch distant flat_sensor")
 
 
-def check_clipping(node: Node, camera: Camera, shapes: Sequence[Shape]) -> None:
+def check_clipping(entity: Entity, camera: Camera, shapes: Sequence[Shape]) -> None:
     """Note if a point of a shape in the picture is not between the planes of a sensor."""
-    near, far = node.number("near_clip", 1e-2), node.number("far_clip", 1e4)
-    if node.plugin == "orthographic":
+    near, far = entity.number("near_clip", 1e-2), entity.number("far_clip", 1e4)
+    if entity.type == "orthographic":
         near, far = 0.0, far - near
     width, height = camera.resolution
     for shape in shapes:
@@ -202,35 +204,35 @@ def check_clipping(node: Node, camera: Camera, shapes: Sequence[Shape]) -> None:
         seen = (x > 0) & (x < width) & (y > 0) & (y < height)
         for name, beyond in (("near_clip", (depth < near) & (depth > 0)), ("far_clip", depth > far)):
             if (seen & beyond).any():
-                node.lose(name)
+                entity.lose(name)
 
 
-def _lens(node: Node, aspect: float) -> Perspective:
+def _lens(entity: Entity, aspect: float) -> Perspective:
     """Return the lens of a perspective camera."""
-    shift = (node.number("principal_point_offset_x", 0.0), -node.number("principal_point_offset_y", 0.0))
+    shift = (entity.number("principal_point_offset_x", 0.0), -entity.number("principal_point_offset_y", 0.0))
     aperture, focus = 0.0, None
-    if node.plugin == "thinlens":
-        aperture = 2 * node.number("aperture_radius", 0.0)
-        focus = node.number("focus_distance", node.number("far_clip", 1e4))
+    if entity.type == "thinlens":
+        aperture = 2 * entity.number("aperture_radius", 0.0)
+        focus = entity.number("focus_distance", entity.number("far_clip", 1e4))
     return Perspective(
-        vertical_fov(node, aspect), shift=shift, aperture=aperture, focus=focus if aperture else None
+        vertical_fov(entity, aspect), shift=shift, aperture=aperture, focus=focus if aperture else None
     )
 
 
-def vertical_fov(node: Node, aspect: float) -> float:
+def vertical_fov(entity: Entity, aspect: float) -> float:
     """Return the vertical field of view in degrees, of a picture `aspect` times as wide as high."""
-    return angle_of(half_tangent(_field_of_view(node, aspect)) / aspect)
+    return angle_of(half_tangent(_field_of_view(entity, aspect)) / aspect)
 
 
-def _field_of_view(node: Node, aspect: float) -> float:
+def _field_of_view(entity: Entity, aspect: float) -> float:
     """Return the horizontal field of view in degrees, of a picture `aspect` times as wide as high."""
-    if "fov" in node.values:
-        if "focal_length" in node.values:
-            node.lose("has fov and focal_length; give one of them; fov counts")
-        angle = node.number("fov", USUAL_FOV, lambda x: 0 < x < 180, "above 0 and below 180 degrees")
-        axis = node.choice("fov_axis", "x", ("x", "y", "diagonal", "smaller", "larger"))
+    if "fov" in entity.values:
+        if "focal_length" in entity.values:
+            entity.lose("has fov and focal_length; give one of them; fov counts")
+        angle = entity.number("fov", USUAL_FOV, lambda x: 0 < x < 180, "above 0 and below 180 degrees")
+        axis = entity.choice("fov_axis", "x", ("x", "y", "diagonal", "smaller", "larger"))
     else:
-        (length,) = numbers("", "focal_length", node.text("focal_length", "50mm").removesuffix("mm"), (1,))
+        (length,) = numbers("", "focal_length", entity.text("focal_length", "50mm").removesuffix("mm"), (1,))
         number("focal_length", length, lambda x: x > 0, "above 0 mm")
         angle, axis = angle_of(np.sqrt(36.0**2 + 24.0**2) / (2 * length)), "diagonal"
     if axis in ("smaller", "larger"):

@@ -16,19 +16,20 @@ from ...lights.environment import ConstantEnvironment
 from ...lights.ies import Web, WebLight
 from ...textures.image import Texture
 from ..description.conversion import only_one
+from ..description.entity import Entity
 from ..description.views import angle_of, half_tangent
 from ..losses import Losses
-from .entities import Entity, Job, converts
+from .entities import converts, spectrum
 
 ROWS = 64  # of an environment that are looked up at once
 MOST_ANGLES = 1024  # of the table of a point light, from pole to pole
 SUBPIXELS = 2  # of its pixels, in both directions
 
 
-def _strength(entity: Entity, name: str, job: Job) -> Doubles:
+def _strength(entity: Entity, name: str) -> Doubles:
     """Return a color times the scale of a light and the exposure of the film, (3,)."""
-    color = np.broadcast_to(entity.spectrum(name, 1.0, job, "light"), 3)
-    return np.asarray(color * (entity.number("scale", 1.0) * job.exposure))
+    color = np.broadcast_to(spectrum(entity, name, 1.0, "light"), 3)
+    return np.asarray(color * (entity.number("scale", 1.0) * entity.job.exposure))
 
 
 def _measured(entity: Entity, name: str, own: float) -> float:
@@ -37,27 +38,27 @@ def _measured(entity: Entity, name: str, own: float) -> float:
     return wanted / own if wanted > 0 and own > 0 else 1.0
 
 
-def _points(entity: Entity, job: Job) -> tuple[Doubles, Doubles]:
+def _points(entity: Entity) -> tuple[Doubles, Doubles]:
     """Return "from" and "to" in the scene, (3,) each."""
-    matrix = job.world @ entity.matrix
+    matrix = entity.job.world @ entity.matrix
     ends = [entity.vector(name, default) for name, default in (("from", (0.0, 0, 0)), ("to", (0.0, 0, 1)))]
     start, end = (matrix[:3, :3] @ point + matrix[:3, 3] for point in ends)
     return start, end
 
 
 @converts("light", "point")
-def _point(entity: Entity, job: Job) -> PointLight:
-    intensity = _strength(entity, "I", job) * _measured(entity, "power", 4 * np.pi)
-    return PointLight(_points(entity, job)[0], intensity)
+def _point(entity: Entity) -> PointLight:
+    intensity = _strength(entity, "I") * _measured(entity, "power", 4 * np.pi)
+    return PointLight(_points(entity)[0], intensity)
 
 
 @converts("light", "goniometric")
-def _goniometric(entity: Entity, job: Job) -> PointLight | WebLight:
+def _goniometric(entity: Entity) -> PointLight | WebLight:
     """Return a point whose intensity by direction is that of an equal-area image; its pole is y."""
-    matrix, strength = job.world @ entity.matrix, _strength(entity, "I", job)
+    matrix, strength = entity.job.world @ entity.matrix, _strength(entity, "I")
     if not entity.text("filename", ""):
         return PointLight(matrix[:3, 3], strength * _measured(entity, "power", 4 * np.pi))
-    factors = _square(entity, job).mean(2, keepdims=True)
+    factors = _square(entity).mean(2, keepdims=True)
     size = len(factors)
     count = min(size, MOST_ANGLES)
     polar, azimuth = (np.arange(n * count + 1, dtype=np.float64) * (180 / count) for n in (1, 2))
@@ -71,15 +72,15 @@ def _goniometric(entity: Entity, job: Job) -> PointLight | WebLight:
 
 
 @converts("light", "spot")
-def _spot(entity: Entity, job: Job) -> SpotLight:
-    start, end = _points(entity, job)
+def _spot(entity: Entity) -> SpotLight:
+    start, end = _points(entity)
     outer = entity.number("coneangle", 30.0, lambda x: 0 < x <= 90, "above 0 and at most 90 degrees")
     inner = outer - entity.number("conedeltaangle", 5.0, lambda x: 0 <= x <= outer, f"in [0, {outer:g}]")
     begin, last = (float(sin_cos(np.float64(np.radians(angle)))[1]) for angle in (inner, outer))
     solid = 2 * np.pi * ((1 - begin) + (begin - last) / 2)
     return SpotLight(
         start,
-        _strength(entity, "I", job) * _measured(entity, "power", solid),
+        _strength(entity, "I") * _measured(entity, "power", solid),
         target=end,
         angle=2 * outer,
         blend=1 - inner / outer,
@@ -88,8 +89,8 @@ def _spot(entity: Entity, job: Job) -> SpotLight:
 
 
 @converts("light", "projection")
-def _projection(entity: Entity, job: Job) -> Projector:
-    slide, matrix = _pixels(entity, job), job.world @ entity.matrix
+def _projection(entity: Entity) -> Projector:
+    slide, matrix = _pixels(entity), entity.job.world @ entity.matrix
     height, width = slide.shape[:2]
     if np.linalg.det(matrix[:3, :3]) > 0:  # pbrt's x is to the right in a space that is left-handed
         slide = slide[:, ::-1]
@@ -99,7 +100,7 @@ def _projection(entity: Entity, job: Job) -> Projector:
     return Projector(
         matrix[:3, 3],
         Texture(np.ascontiguousarray(slide)),
-        entity.number("scale", 1.0) * job.exposure * _measured(entity, "power", power),
+        entity.number("scale", 1.0) * entity.job.exposure * _measured(entity, "power", power),
         direction=matrix[:3, 2],
         fov=angle_of(half),
         up=matrix[:3, 1],
@@ -107,25 +108,25 @@ def _projection(entity: Entity, job: Job) -> Projector:
 
 
 @converts("light", "distant")
-def _distant(entity: Entity, job: Job) -> DirectionalLight:
-    start, end = _points(entity, job)
-    return DirectionalLight(end - start, _strength(entity, "L", job) * _measured(entity, "illuminance", 1.0))
+def _distant(entity: Entity) -> DirectionalLight:
+    start, end = _points(entity)
+    return DirectionalLight(end - start, _strength(entity, "L") * _measured(entity, "illuminance", 1.0))
 
 
 @converts("light", "infinite")
-def _infinite(entity: Entity, job: Job) -> Environment:
+def _infinite(entity: Entity) -> Environment:
     if not entity.text("filename", ""):
-        return Environment(_strength(entity, "L", job) * _measured(entity, "illuminance", np.pi))
+        return Environment(_strength(entity, "L") * _measured(entity, "illuminance", np.pi))
     if "L" in entity.values:
         raise SceneError("has L and filename; give one of them")
-    pixels = _square(entity, job)
+    pixels = _square(entity)
     size = len(pixels)
     # one lookup for each pixel, in the middle of it
     at = (np.arange(size) + 0.5) / size
     upward = np.maximum(square_to_sphere(*np.meshgrid(at, at))[2], 0)
     own = float((luminance(pixels.transpose(2, 0, 1)) * upward).mean() * 2 * np.pi)
-    factor = entity.number("scale", 1.0) * job.exposure * _measured(entity, "illuminance", own)
-    axes = (job.world @ entity.matrix)[:3, :3]
+    factor = entity.number("scale", 1.0) * entity.job.exposure * _measured(entity, "illuminance", own)
+    axes = (entity.job.world @ entity.matrix)[:3, :3]
     if not np.linalg.svd(axes, compute_uv=False)[2] > 1e-12 * np.abs(axes).max():
         raise SceneError(f"the transform of its directions is singular: {axes.tolist()}")
     to_light = np.asarray(np.linalg.inv(axes), np.float64)
@@ -143,20 +144,20 @@ def summed(lights: list[Light], losses: Losses) -> list[Light]:
 
 
 @converts("area light", "diffuse")
-def _area(entity: Entity, job: Job) -> tuple[Any, float, bool]:
+def _area(entity: Entity) -> tuple[Any, float, bool]:
     """Return the radiance, its luminance, and whether it leaves both sides."""
     sides = entity.flag("twosided")
     entity.number("power", -1.0)
     if not entity.text("filename", ""):
-        radiance = _strength(entity, "L", job)
-        return radiance, float(luminance(np.broadcast_to(entity.spectrum("L", 1.0, job, "light"), 3))), sides
-    pixels, factor = _pixels(entity, job), entity.number("scale", 1.0) * job.exposure
+        radiance = _strength(entity, "L")
+        return radiance, float(luminance(np.broadcast_to(spectrum(entity, "L", 1.0, "light"), 3))), sides
+    pixels, factor = _pixels(entity), entity.number("scale", 1.0) * entity.job.exposure
     return Texture(pixels, wrap="clamp", scale=factor), float(luminance(pixels.mean((0, 1)))), sides
 
 
-def _pixels(entity: Entity, job: Job) -> Floats:
+def _pixels(entity: Entity) -> Floats:
     """Return the linear colors of an image, (H, W, 3)."""
-    codes = job.picture(entity, entity.text("filename", "")).codes
+    codes = entity.job.picture(entity, entity.text("filename", "")).codes
     pixels = codes_to_linear(codes) if codes.dtype.kind == "u" else codes.astype(np.float32)
     pixels = pixels[..., :3] if pixels.shape[2] >= 3 else np.repeat(pixels[..., :1], 3, 2)
     if not np.isfinite(pixels).all():
@@ -164,9 +165,9 @@ def _pixels(entity: Entity, job: Job) -> Floats:
     return np.maximum(pixels, 0)
 
 
-def _square(entity: Entity, job: Job) -> Floats:
+def _square(entity: Entity) -> Floats:
     """Return the linear colors of an equal-area image, (n, n, 3)."""
-    pixels = _pixels(entity, job)
+    pixels = _pixels(entity)
     height, width = pixels.shape[:2]
     if width == 2 * height:
         entity.lose("its image, which is not square, is taken as one by longitude and latitude")

@@ -12,7 +12,7 @@ from ...arrays.elementary import arctan2
 from ...arrays.vec import Doubles, Ints
 from ...core.errors import SceneError
 from ...textures.image import Texture
-from .entities import Entity, Job
+from ..description.entity import Entity
 
 TURN = 2 * np.pi
 
@@ -58,14 +58,14 @@ class MappedTexture(Texture, Mapped):
     """An image with a mapping."""
 
 
-def mapping_of(entity: Entity, job: Job) -> Mapping:
+def mapping_of(entity: Entity) -> Mapping:
     """Return the mapping of a texture."""
     kind = entity.choice("mapping", "uv", ("uv", "spherical", "cylindrical", "planar"))
     if kind == "uv":
         scale_u, scale_v = (entity.number(name, 1.0) for name in ("uscale", "vscale"))
         rows = [scale_u, 0, _shift(entity, "u")], [0, scale_v, _shift(entity, "v")], [0, 0, 1]
         return Mapping(np.array(rows))
-    matrix = job.world @ entity.matrix
+    matrix = entity.job.world @ entity.matrix
     if not np.linalg.cond(matrix[:3, :3]) < 1e12:
         raise SceneError(f"the transform of its mapping is singular: {matrix[:3, :3].tolist()}")
     inverse = np.asarray(np.linalg.inv(matrix), np.float64)

@@ -31,24 +31,25 @@ from ...textures.image import Texture
 from ...textures.normal_map import BumpMap, NormalMap
 from ..description.computed import Value, clipped, computed
 from ..description.conversion import GRAY
-from .entities import NAMED, Entity, Job, converts, unsupported
+from ..description.entity import Entity
+from .entities import NAMED, converts, spectrum, unsupported
 from .textures import color, fourth_root, scalar, square_root
 
 LEAST_INDEX = 1e-6
 CELLS = 1024  # of the cosine, for integrals over directions
 
 
-def _albedo(entity: Entity, name: str, default: float, job: Job, factor: float = 1.0) -> Value:
+def _albedo(entity: Entity, name: str, default: float, factor: float = 1.0) -> Value:
     """Return a reflectance times a factor."""
-    return clipped(color(entity, name, default, job), factor)
+    return clipped(color(entity, name, default), factor)
 
 
-def _roughness(entity: Entity, job: Job, prefix: str = "") -> dict[str, Value]:
+def _roughness(entity: Entity, prefix: str = "") -> dict[str, Value]:
     """Return the roughness, α = roughness², along u and v."""
     root = fourth_root if entity.flag("remaproughness", True) else square_root
     names = [f"{prefix}{axis}roughness" for axis in ("u", "v")]
-    base = scalar(entity, f"{prefix}roughness", 0.0, job)
-    u, v = (scalar(entity, name, 0.0, job) if name in entity.values else base for name in names)
+    base = scalar(entity, f"{prefix}roughness", 0.0)
+    u, v = (scalar(entity, name, 0.0) if name in entity.values else base for name in names)
     u, v = (
         value
         if isinstance(value, BaseTexture)
@@ -60,19 +61,19 @@ def _roughness(entity: Entity, job: Job, prefix: str = "") -> dict[str, Value]:
     return {"roughness": computed(root, u), "roughness_v": computed(root, v)}
 
 
-def _index(entity: Entity, name: str, job: Job, default: float = 1.5) -> Any:
+def _index(entity: Entity, name: str, default: float = 1.5) -> Any:
     """Return an index of refraction: a number, or one for each channel."""
-    value = np.maximum(entity.spectrum(name, default, job, "unbounded"), LEAST_INDEX)
+    value = np.maximum(spectrum(entity, name, default, "unbounded"), LEAST_INDEX)
     return float(value) if np.ndim(value) == 0 else value
 
 
-def _made(entity: Entity, bsdf: Any, job: Job) -> Material:
+def _made(entity: Entity, bsdf: Any) -> Material:
     """Return a material with the bumps of its entity."""
     bumps: Any = None
     file = entity.text("normalmap", "")
     if file:
-        bumps = NormalMap(Texture(job.picture(entity, file), srgb=False))
-    height = scalar(entity, "displacement", 0.0, job)
+        bumps = NormalMap(Texture(entity.job.picture(entity, file), srgb=False))
+    height = scalar(entity, "displacement", 0.0)
     if isinstance(height, Texture) and not file:
         heights = copy(height)
         heights.srgb = False  # it is decoded all the same
@@ -84,24 +85,24 @@ def _made(entity: Entity, bsdf: Any, job: Job) -> Material:
     return Material(bsdf, normal_map=bumps, name=entity.name or None)
 
 
-def _surface(types: str) -> Callable[[Callable[[Entity, Job], Bsdf]], Any]:
+def _surface(types: str, harmless: str = "") -> Callable[[Callable[[Entity], Bsdf]], Any]:
     """Put a function that returns the BSDF of materials into the table."""
-    return lambda make: converts("material", types)(lambda entity, job: _made(entity, make(entity, job), job))
+    add = converts("material", types, harmless=harmless)
+    return lambda make: add(lambda entity: _made(entity, make(entity)))
 
 
-@_surface("coateddiffuse subsurface")
-def _coated_diffuse(entity: Entity, job: Job) -> Plastic:
-    entity.harmless("maxdepth nsamples")
+@_surface("coateddiffuse subsurface", harmless="maxdepth nsamples")
+def _coated_diffuse(entity: Entity) -> Plastic:
     below = entity.type == "subsurface"
     if below:
         entity.harmless("mfp sigma_a sigma_s scale name g")
         entity.lose("light below the surface; a coated diffuse surface in its place")
-    ior = float(np.mean(_index(entity, "eta", job, 1.33 if below else 1.5)))
-    facets = _roughness(entity, job)
+    ior = float(np.mean(_index(entity, "eta", 1.33 if below else 1.5)))
+    facets = _roughness(entity)
     if facets.pop("roughness_v", None) is not None:
         entity.lose("vroughness")
-    thick = 0.0 if below else _layer(entity, job)
-    base = _albedo(entity, "reflectance", 0.5, job)
+    thick = 0.0 if below else _layer(entity)
+    base = _albedo(entity, "reflectance", 0.5)
     if thick:
         base = computed(_below_coat, base, *_coat(thick, ior))
     return Plastic(base, ior=ior, nonlinear=True, multiscatter=False, **facets)
@@ -123,27 +124,26 @@ def _below_coat(base: Any, entry: Any, leaving: Any, back: Any, clear: Any) -> A
     return out / (1 - clear + clear * out)
 
 
-def _layer(entity: Entity, job: Job) -> float:
+def _layer(entity: Entity) -> float:
     """Return the thickness of what is between two layers, which only absorbs."""
     for name in ("albedo", "g"):
-        value = color(entity, name, 0.0, job)
+        value = color(entity, name, 0.0)
         if isinstance(value, BaseTexture) or np.any(value):
             entity.lose(name)
-    thick = scalar(entity, "thickness", 0.01, job)
+    thick = scalar(entity, "thickness", 0.01)
     if isinstance(thick, BaseTexture):
         entity.lose("the texture thickness; 0.01 in its place")
         return 0.01
     return max(thick, 0.0)
 
 
-@_surface("coatedconductor")
-def _coated_conductor(entity: Entity, job: Job) -> Principled:
+@_surface("coatedconductor", harmless="maxdepth nsamples")
+def _coated_conductor(entity: Entity) -> Principled:
     """Return a metal with a clear coat, which is as it would be in the coat."""
-    entity.harmless("maxdepth nsamples")
-    eta, k = _metal(entity, job, "conductor.")
-    _layer(entity, job)
-    coat, metal = (_roughness(entity, job, f"{name}.") for name in ("interface", "conductor"))
-    ior = float(np.mean(_index(entity, "interface.eta", job)))
+    eta, k = _metal(entity, "conductor.")
+    _layer(entity)
+    coat, metal = (_roughness(entity, f"{name}.") for name in ("interface", "conductor"))
+    ior = float(np.mean(_index(entity, "interface.eta")))
     entity.lose("the light between its layers; a metal with a clearcoat in its place")
     base = computed(_reflectance, eta, k, ior, rising=False)
     return Principled(
@@ -163,42 +163,40 @@ def _extinction(reflectance: Any) -> Any:
     return 2 * np.sqrt(kept) / np.sqrt(1 - kept)
 
 
-def _metal(entity: Entity, job: Job, prefix: str) -> tuple[Value, Value]:
+def _metal(entity: Entity, prefix: str) -> tuple[Value, Value]:
     """Return η and k, given as such or by a reflectance."""
     if "reflectance" in entity.values:
         if {f"{prefix}eta", f"{prefix}k"} & entity.values.keys():
             raise SceneError(f"has reflectance, and {prefix}eta or {prefix}k; give one of them")
-        return 1.0, computed(_extinction, color(entity, "reflectance", 0.5, job))
+        return 1.0, computed(_extinction, color(entity, "reflectance", 0.5))
     eta, k = (
-        color(entity, f"{prefix}{name}", NAMED[f"metal-Cu-{name}"], job, "unbounded") for name in ("eta", "k")
+        color(entity, f"{prefix}{name}", NAMED[f"metal-Cu-{name}"], "unbounded") for name in ("eta", "k")
     )
     return (eta if isinstance(eta, BaseTexture) else np.maximum(eta, LEAST_INDEX)), k
 
 
-_surface("diffuse")(lambda entity, job: Diffuse(_albedo(entity, "reflectance", 0.5, job)))
-_surface("measured")(lambda entity, job: job.measured(entity))
-_surface("conductor")(
-    lambda entity, job: Conductor(*_metal(entity, job, ""), **_roughness(entity, job), multiscatter=False)
-)
+_surface("diffuse")(lambda entity: Diffuse(_albedo(entity, "reflectance", 0.5)))
+_surface("measured")(lambda entity: entity.job.measured(entity))
+_surface("conductor")(lambda entity: Conductor(*_metal(entity, ""), **_roughness(entity), multiscatter=False))
 _surface("dielectric")(
-    lambda entity, job: Dielectric(_index(entity, "eta", job), **_roughness(entity, job), multiscatter=False)
+    lambda entity: Dielectric(_index(entity, "eta"), **_roughness(entity), multiscatter=False)
 )
-_surface("thindielectric")(lambda entity, job: ThinDielectric(float(np.mean(_index(entity, "eta", job)))))
+_surface("thindielectric")(lambda entity: ThinDielectric(float(np.mean(_index(entity, "eta")))))
 
 
 @_surface("diffusetransmission")
-def _diffuse_transmission(entity: Entity, job: Job) -> DiffuseTransmission:
+def _diffuse_transmission(entity: Entity) -> DiffuseTransmission:
     factor = entity.number("scale", 1.0)
-    sides = (_albedo(entity, name, 0.25, job, factor) for name in ("reflectance", "transmittance"))
+    sides = (_albedo(entity, name, 0.25, factor) for name in ("reflectance", "transmittance"))
     return DiffuseTransmission(*sides)
 
 
 @_surface("mix")
-def _mix(entity: Entity, job: Job) -> Mix:
-    names, found = entity.get("materials", ("string",)) or [], list[Material]()
+def _mix(entity: Entity) -> Mix:
+    names, found = entity.get("materials", None, "string") or [], list[Material]()
     for name in names[:2]:
         with entity.lost.part(entity.label):
-            found.append(job.convert(job.refer("material", name)))
+            found.append(entity.job.convert(entity.job.refer("material", name)))
     if len(found) == 1:
         entity.lose(f"{names} has one material that there is; it needs two")
         found *= 2
@@ -209,25 +207,25 @@ def _mix(entity: Entity, job: Job) -> Mix:
         raise SceneError("materials has an 'interface'; it cannot be mixed")
     if first.normal_map is not None or second.normal_map is not None:
         entity.lose("the bumps of its materials")
-    return Mix(first.bsdf, second.bsdf, scalar(entity, "amount", 0.5, job))
+    return Mix(first.bsdf, second.bsdf, scalar(entity, "amount", 0.5))
 
 
-converts("material", "interface none")(lambda entity, job: Material(NullSurface(), name=entity.name or None))
+converts("material", "interface none")(lambda entity: Material(NullSurface(), name=entity.name or None))
 
 
 @_surface("hair")
-def _hair(entity: Entity, job: Job) -> Diffuse:
+def _hair(entity: Entity) -> Diffuse:
     entity.lose("a diffuse surface in its place")
-    return Diffuse(_albedo(entity, "color" if "color" in entity.values else "reflectance", 0.5, job))
+    return Diffuse(_albedo(entity, "color" if "color" in entity.values else "reflectance", 0.5))
 
 
 @converts("medium", "homogeneous")
-def _homogeneous(entity: Entity, job: Job) -> Medium | None:
+def _homogeneous(entity: Entity) -> Medium | None:
     if entity.text("preset", ""):
         entity.lose("preset; left out")
         return None
-    absorbed, scattered = (entity.spectrum(name, 1.0, job, "unbounded") for name in ("sigma_a", "sigma_s"))
-    glow = entity.spectrum("Le", 0.0, job, "light") * (entity.number("Lescale", 1.0) * job.exposure)
+    absorbed, scattered = (spectrum(entity, name, 1.0, "unbounded") for name in ("sigma_a", "sigma_s"))
+    glow = spectrum(entity, "Le", 0.0, "light") * (entity.number("Lescale", 1.0) * entity.job.exposure)
     return Medium(
         absorbed,
         scattered,
@@ -238,50 +236,48 @@ def _homogeneous(entity: Entity, job: Job) -> Medium | None:
 
 
 @converts("medium", "uniformgrid")
-def _grid(entity: Entity, job: Job) -> GridMedium:
+def _grid(entity: Entity) -> GridMedium:
     density = _voxels(entity, "density", "float")
     if density is None:
         raise SceneError("has no density")
-    absorbed, scattered = (entity.spectrum(name, 1.0, job, "unbounded") for name in ("sigma_a", "sigma_s"))
-    glow = entity.spectrum("Le", 0.0, job, "light") * job.exposure * absorbed
+    absorbed, scattered = (spectrum(entity, name, 1.0, "unbounded") for name in ("sigma_a", "sigma_s"))
+    glow = spectrum(entity, "Le", 0.0, "light") * entity.job.exposure * absorbed
     factor = _voxels(entity, "Lescale", "float")
     if factor is not None:
         glow = (density * factor)[..., None] * np.broadcast_to(glow, 3)
-    return GridMedium(
-        density, **_placed(entity, job), absorption=absorbed, scattering=scattered, emission=glow
-    )
+    return GridMedium(density, **_placed(entity), absorption=absorbed, scattering=scattered, emission=glow)
 
 
 @converts("medium", "rgbgrid")
-def _color_grid(entity: Entity, job: Job) -> GridMedium:
+def _color_grid(entity: Entity) -> GridMedium:
     absorbed, scattered, light = (_voxels(entity, name, "rgb") for name in ("sigma_a", "sigma_s", "Le"))
     given = [each for each in (absorbed, scattered) if each is not None]
     if not given:
         raise SceneError("has no sigma_a and no sigma_s")
     absorbed, scattered = (np.ones_like(given[0]) if each is None else each for each in (absorbed, scattered))
-    factor = entity.number("Lescale", 1.0) * job.exposure
+    factor = entity.number("Lescale", 1.0) * entity.job.exposure
     extinction = absorbed + scattered
     return GridMedium(
         extinction,
-        **_placed(entity, job),
+        **_placed(entity),
         albedo=scattered / np.where(extinction == 0, 1, extinction),
         emission=None if light is None else absorbed * light * factor,
     )
 
 
-def _placed(entity: Entity, job: Job) -> dict[str, Any]:
+def _placed(entity: Entity) -> dict[str, Any]:
     """Return where a grid is, and its phase function and scale."""
     low, high = entity.vector("p0", (0.0, 0.0, 0.0)), entity.vector("p1", (1.0, 1.0, 1.0))
     box = np.diag([*(high - low), 1.0])
     box[:3, 3] = low
     phase, scale = HenyeyGreenstein(entity.number("g", 0.0)), entity.number("scale", 1.0)
-    return {"transform": job.world @ entity.matrix @ box, "phase": phase, "scale": scale}
+    return {"transform": entity.job.world @ entity.matrix @ box, "phase": phase, "scale": scale}
 
 
 def _voxels(entity: Entity, name: str, kind: str) -> Any:
     """Return the numbers (z, y, x) or colors (z, y, x, 3) of a grid; None without."""
     size = tuple(entity.whole(each, 1, 1) for each in ("nz", "ny", "nx"))
-    given, count = entity.array(name, (kind,)), np.prod(size, dtype=float)
+    given, count = entity.get(name, None, kind), np.prod(size, dtype=float)
     if given is None:
         return None
     if len(given) != count:
@@ -293,21 +289,23 @@ def _voxels(entity: Entity, name: str, kind: str) -> Any:
 unsupported("medium", "cloud nanovdb")
 
 
-def material_of(state: Any, alpha: Value, job: Job, label: Entity) -> Material:
+def material_of(shape: Entity, alpha: Value) -> Material:
     """Return the material of a shape, with its opacity and its medium."""
-    given = state.material
+    state, job, losses = shape.state, shape.job, shape.lost
+    given, inside, outside = state.material, None, None
     if isinstance(given, str):
         name, given = given, None
-        with label.lost.part(label.label, done="gray in its place"):
+        with losses.part(shape.label, done="gray in its place"):
             given = job.refer("material", name)
     base: Material = GRAY if given is None else job.convert(given)
-    inside = outside = None
-    with label.lost.part(label.label):
-        inside = job.medium(state.inside) if state.inside != state.outside else None
-    with label.lost.part(label.label):
-        outside = job.medium(state.outside) if state.outside != state.inside else None
+    if state.inside != state.outside:
+        with losses.part(shape.label):
+            inside = job.medium(state.inside)
+        with losses.part(shape.label):
+            outside = job.medium(state.outside)
     if outside not in (None, job.around) and state.outside not in job.insides:
-        label.lose(f"the medium {state.outside!r} outside")
+        shape.lose(f"the medium {state.outside!r} outside")
     if alpha is None and inside is None:
         return base
-    return job.changed(base, interior=inside, alpha=alpha)
+    changed: Material = job.changed(base, interior=inside, alpha=alpha)
+    return changed

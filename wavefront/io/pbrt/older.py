@@ -5,7 +5,8 @@ Source: pbrt.org, "pbrt-v3 Input File Format" and "pbrt-v2 Input File Format".
 
 from __future__ import annotations
 
-from .entities import TABLE, Entity
+from ..description.entity import Entity
+from .entities import TABLE, retype
 
 COLORS = ("reflectance", "Kd", "color", "Kr", "albedo")  # parameters of materials
 SHAPES = ("cone", "paraboloid", "hyperboloid", "nurbs", "heightfield")
@@ -37,24 +38,23 @@ OLDER: dict[tuple[str, str], tuple[str | None, dict[str, str]]] = {
 
 def upgrade(entity: Entity) -> None:
     """Give an entity of an older version, or a material that is unknown, the nearest type, which is noted."""
-    kind = entity.kind.removeprefix("float ").removeprefix("spectrum ")
-    if (kind, entity.type) in TABLE and kind != "light":
+    kind, known = entity.kind, (entity.kind, entity.type) in TABLE.makers
+    if known and kind != "light":
         return
     nearest, names = OLDER.get((kind, entity.type), (None, {}))
     given = next((name for name in COLORS if name in entity.values), None)
     if (kind, entity.type) in OLDER:
         done = f"as {nearest!r}" if nearest else "left out"
         entity.lose(f"is of pbrt-v3 or older, and this reads pbrt-v4; {done}")
-    elif kind == "material" and (kind, entity.type) not in TABLE and given is not None:
+    elif kind == "material" and not known and given is not None:
         entity.lose("pbrt has no such material; a diffuse surface of its color in its place")
         nearest, names = "diffuse", {given: "reflectance"}
-    elif kind == "camera" and (kind, entity.type) not in TABLE:
+    elif kind == "camera" and not known:
         entity.lose("pbrt has no such camera; 'perspective' in its place")
         nearest = "perspective"
     elif kind == "light" and "mapname" in entity.values:
         entity.lose("mapname is of pbrt-v3, and this reads pbrt-v4; as filename")
         names = {"mapname": "filename"}
-    entity.type = nearest or entity.type
+    retype(entity, nearest or entity.type)
     for old, new in names.items():
-        if old in entity.values:
-            entity.values.setdefault(new, entity.values.pop(old))
+        entity.rename(old, new)

@@ -16,11 +16,12 @@ from ...sampling.filters import GaussianFilter
 from ...scene import Scene
 from ...shapes.transform import Matrix, rotation, translation
 from ..description.conversion import placed, shown
+from ..description.entity import Entity
 from ..description.views import looking
 from ..repair import RawMesh
 from ..sources import SceneFiles
 from . import lights, materials, textures  # noqa: F401  they fill the table
-from .entities import Entity, Job
+from .entities import Job, retype, values_of
 from .older import upgrade
 from .parser import Parameter, Statement, statements
 from .shapes import place, place_object
@@ -109,7 +110,7 @@ class Reader:
                 settings |= job.convert(self.options[name])
         every = [*self.shapes, *(entity for each in self.objects.values() for entity in each)]
         job.insides = {entity.state.inside for entity in every}
-        found = [shape for entity in self.shapes for shape in place(entity, job)]
+        found = [shape for entity in self.shapes for shape in place(entity)]
         for name, matrices in self.uses.items():
             found += place_object(self.objects[name], job, np.array(matrices))
         lamps = [light for entity in self.lights if (light := job.convert(entity)) is not None]
@@ -117,10 +118,16 @@ class Reader:
         view = None if camera is None else job.convert(camera)
         return Scene(shown(found, lamps, job.files.losses), lamps, view, settings=settings, medium=job.around)
 
-    def _entity(self, kind: str, statement: Statement, target: str, type: str, name: str = "") -> Entity:
+    def _entity(
+        self, kind: str, statement: Statement, target: str, type: str, name: str = "", variant: str = ""
+    ) -> Entity:
         given = self.state.defaults.get(target, {}) | statement.parameters
-        matrix, losses = self.state.matrices[0], self.job.files.losses
-        entity = Entity(kind, type, statement.place, given, losses, matrix, self.state, name=name)
+        values = {key: values_of(each) for key, each in given.items()}
+        entity = Entity(kind, type, name, statement.place, values, self.job, variant=variant)
+        entity.types = {key: each.type for key, each in given.items()}
+        entity.unread.difference_update(key for key, each in given.items() if each.optional)
+        entity.matrix, entity.state = self.state.matrices[0], self.state
+        retype(entity, type)
         if type:
             upgrade(entity)
         return entity
@@ -224,8 +231,9 @@ class Reader:
         name, kind, type = statement.words
         if kind not in ("float", "spectrum", "color"):
             raise SceneError(f"the texture {name!r} is of {kind!r}; it must be of float or spectrum")
-        kind = f"{'spectrum' if kind == 'color' else kind} texture"
-        self._name(kind, name, self._entity(kind, statement, "texture", type, name))
+        variant = "spectrum" if kind == "color" else kind
+        entity = self._entity("texture", statement, "texture", type, name, variant)
+        self._name(f"{variant} texture", name, entity)
 
     def _name(self, kind: str, name: str, entity: Entity) -> None:
         if self.job.named.setdefault((kind, name), entity) is not entity:
@@ -239,10 +247,10 @@ class Reader:
         """Note a named material or medium, whose type is a parameter."""
         target = statement.name.removeprefix("MakeNamed").lower()
         entity = self._entity(target, statement, target, "", statement.words[0])
-        entity.type = entity.text("type", "")
+        retype(entity, entity.text("type", ""))
         if not entity.type:
             raise SceneError(f"{statement.name} {entity.name!r} has no type")
-        del entity.values["type"]
+        del entity.values["type"], entity.types["type"]
         upgrade(entity)
         self._name(target, entity.name, entity)
 

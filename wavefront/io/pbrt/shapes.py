@@ -16,11 +16,12 @@ from ...shapes.transform import EVEN, Matrix, is_even
 from ...textures.base import BaseTexture
 from ..description.computed import clipped, computed, product
 from ..description.conversion import placed, textures_in
+from ..description.entity import Entity
 from ..description.placing import facing, in_range, moved_raw
 from ..repair import RawMesh, build, existing
 from ..surfaces import RINGS, SIDES, over_square
 from ..trimesh.library import import_trimesh
-from .entities import Entity, Job, converts, unsupported
+from .entities import Job, converts, unsupported
 from .mappings import Mapped, Mapping
 from .materials import material_of
 from .textures import scalar
@@ -30,7 +31,7 @@ POINTS, PAIRS, NORMALS = ("point3", "point"), ("point2", "float"), ("normal3", "
 
 
 @converts("shape", "sphere")
-def _sphere(entity: Entity, job: Job) -> RawMesh:
+def _sphere(entity: Entity) -> RawMesh:
     radius = _radius(entity)
     low, high = sorted(entity.number(f"z{end}", at * radius) for end, at in (("min", -1), ("max", 1)))
     # polar angles in half turns, from the lower end to the upper one
@@ -47,7 +48,7 @@ def _sphere(entity: Entity, job: Job) -> RawMesh:
 
 
 @converts("shape", "cylinder")
-def _cylinder(entity: Entity, job: Job) -> RawMesh:
+def _cylinder(entity: Entity) -> RawMesh:
     radius, turns = _radius(entity), _turns(entity)
     low, high = sorted((entity.number("zmin", -1.0), entity.number("zmax", 1.0)))
 
@@ -60,7 +61,7 @@ def _cylinder(entity: Entity, job: Job) -> RawMesh:
 
 
 @converts("shape", "disk")
-def _disk(entity: Entity, job: Job) -> RawMesh:
+def _disk(entity: Entity) -> RawMesh:
     radius, turns, height = _radius(entity), _turns(entity), entity.number("height", 0.0)
     inner = entity.number("innerradius", 0.0, lambda x: 0 <= x < radius, f"from 0 to below {radius:g}")
 
@@ -72,15 +73,13 @@ def _disk(entity: Entity, job: Job) -> RawMesh:
     return over_square("disk", SIDES, 1, point)
 
 
-@converts("shape", "trianglemesh")
-def _triangle_mesh(entity: Entity, job: Job) -> RawMesh:
-    entity.harmless("faceIndices")
+@converts("shape", "trianglemesh", harmless="faceIndices")
+def _triangle_mesh(entity: Entity) -> RawMesh:
     return _arrays(entity, 3)
 
 
-@converts("shape", "bilinearmesh")
-def _bilinear_mesh(entity: Entity, job: Job) -> RawMesh:
-    entity.harmless("faceIndices")
+@converts("shape", "bilinearmesh", harmless="faceIndices")
+def _bilinear_mesh(entity: Entity) -> RawMesh:
     raw = _arrays(entity, 4)
     patches = raw.faces.reshape(-1, 4)
     a, b, c, d = (raw.vertices[patches[:, i]] for i in range(4))
@@ -94,24 +93,23 @@ def _bilinear_mesh(entity: Entity, job: Job) -> RawMesh:
 
 
 @converts("shape", "plymesh")
-def _ply_mesh(entity: Entity, job: Job) -> RawMesh:
-    path = job.find(entity.text("filename", ""))
-    raws = job.once(path, lambda: job.read_mesh(path))
+def _ply_mesh(entity: Entity) -> RawMesh:
+    path = entity.job.find(entity.text("filename", ""))
+    raws = entity.job.once(path, lambda: entity.job.read_mesh(path))
     if not raws:
         raise SceneError(f"{path}: has no faces")
     faces = raws[0].faces
-    there = job.once(
+    there = entity.job.once(
         (path, "there"), lambda: existing(entity.lost, entity.label, faces, len(raws[0].vertices))
     )
     raw = raws[0] if there.all() else replace(raws[0], faces=faces[there])
     return replace(raw, name=path.name.partition(".")[0], colors=None)
 
 
-@converts("shape", "loopsubdiv")
-def _loop(entity: Entity, job: Job) -> RawMesh:
-    entity.harmless("scheme")
+@converts("shape", "loopsubdiv", harmless="scheme")
+def _loop(entity: Entity) -> RawMesh:
     raw, levels = _arrays(entity, 3), entity.whole("levels", 3, 0, 16)
-    job.files.limits.check_triangles(entity.label, len(raw.faces) * 4**levels)
+    entity.job.files.limits.check_triangles(entity.label, len(raw.faces) * 4**levels)
     used, faces = np.unique(raw.faces, return_inverse=True)  # trimesh refuses vertices without faces
     subdivided = import_trimesh().remesh.subdivide_loop
     try:
@@ -134,10 +132,10 @@ def _turns(entity: Entity) -> float:
 
 def _arrays(entity: Entity, corners: int) -> RawMesh:
     """Return the arrays of a shape, as they are; its faces have a number of corners."""
-    vertices = entity.array("P", POINTS)
+    vertices = entity.get("P", None, *POINTS)
     if vertices is None:
         raise SceneError("has no P")
-    indices = entity.get("indices", ("integer",))
+    indices = entity.get("indices", None, "integer")
     if indices is None:
         if len(vertices) != corners:
             raise SceneError(f"has {len(vertices)} points and no indices")
@@ -148,11 +146,12 @@ def _arrays(entity: Entity, corners: int) -> RawMesh:
     faces = indices[:whole].astype(np.intp).reshape(-1, corners)
     there = existing(entity.lost, entity.label, faces, len(vertices))
     raw = RawMesh(entity.type, vertices, faces[there])
-    given = entity.get("uv", PAIRS)
+    given = entity.get("uv", None, *PAIRS)
     if given is None:
-        given = entity.get("st", PAIRS)
-    raw.normals = _rows(entity, "N", entity.array("N", NORMALS), len(vertices))
+        given = entity.get("st", None, *PAIRS)
+    raw.normals = _rows(entity, "N", entity.get("N", None, *NORMALS), len(vertices))
     if given is not None:
+        given = np.ravel(given)
         given = given[: len(given) // 2 * 2].reshape(-1, 2)
     raw.uvs = _rows(entity, "uv", given, len(vertices))
     return raw
@@ -166,10 +165,10 @@ def _rows(entity: Entity, name: str, rows: Doubles | None, count: int) -> Double
     return None
 
 
-def place(entity: Entity, job: Job) -> list[Shape]:
+def place(entity: Entity) -> list[Shape]:
     """Return a shape where it stands in the scene."""
-    with job.files.losses.part(entity.label), placed(entity.label):
-        return _shapes(entity, job, job.world @ entity.matrix, entity.state.area)
+    with entity.job.files.losses.part(entity.label), placed(entity.label):
+        return _shapes(entity, entity.job.world @ entity.matrix, entity.state.area)
     return []
 
 
@@ -182,7 +181,7 @@ def place_object(entities: Sequence[Entity], job: Job, matrices: Matrix) -> list
             job.count_instances(len(matrices))
             if entity.state.area is not None:
                 entity.lose("the light of a shape in an object")
-            made = _shapes(entity, job, job.world @ entity.matrix, None, even)
+            made = _shapes(entity, job.world @ entity.matrix, None, even)
             if any(_mappings(shape.material) for shape in made):
                 entity.lose("where its instances are; all have the texture coordinates of the object")
             shapes += made
@@ -192,31 +191,31 @@ def place_object(entities: Sequence[Entity], job: Job, matrices: Matrix) -> list
     return []
 
 
-def _shapes(entity: Entity, job: Job, matrix: Matrix, light: Entity | None, even: bool = True) -> list[Shape]:
+def _shapes(entity: Entity, matrix: Matrix, light: Entity | None, even: bool = True) -> list[Shape]:
     """Return a shape, placed by a matrix, which may be an area light; `even` if it is not stretched later."""
-    exact = _exact_sphere(entity, job, matrix, light) if even else None
-    shape = exact or _mesh(entity, job, matrix, light)
+    exact = _exact_sphere(entity, matrix, light) if even else None
+    shape = exact or _mesh(entity, matrix, light)
     return [] if shape is None else [shape]
 
 
-def _exact_sphere(entity: Entity, job: Job, matrix: Matrix, light: Entity | None) -> Sphere | None:
+def _exact_sphere(entity: Entity, matrix: Matrix, light: Entity | None) -> Sphere | None:
     """Return a sphere that needs no mesh: a whole one, without textures, that is not stretched."""
     if entity.type != "sphere" or entity.values.keys() - {"radius", "alpha"} or entity.state.reverse:
         return None
     if not is_even(matrix[None], ROUND):
         return None
-    alpha = _opacity(entity, light, job)
+    alpha = _opacity(entity, light)
     radius = _radius(entity) * float(np.linalg.svd(matrix[:3, :3], compute_uv=False)[0])
-    material = material_of(entity.state, alpha, job, entity)
-    emission, _ = _emission(light, 4 * np.pi * radius * radius, job)
+    material = material_of(entity, alpha)
+    emission, _ = _emission(light, 4 * np.pi * radius * radius)
     if textures_in((material, emission)):
         return None
     return Sphere(matrix[:3, 3], radius, material=material, emission=emission)
 
 
-def _mesh(entity: Entity, job: Job, matrix: Matrix, light: Entity | None) -> Mesh | None:
+def _mesh(entity: Entity, matrix: Matrix, light: Entity | None) -> Mesh | None:
     """Return the mesh of a shape, placed by a matrix, which may be an area light."""
-    raw = job.convert(entity)
+    raw = entity.job.convert(entity)
     if not raw:
         return None
     if not in_range(matrix[None])[0]:
@@ -224,10 +223,10 @@ def _mesh(entity: Entity, job: Job, matrix: Matrix, light: Entity | None) -> Mes
     with np.errstate(over="ignore", invalid="ignore"):
         raw = moved_raw(facing(raw, entity.state.reverse), matrix)
         area = _area(raw) if light else 0.0
-    job.count(raw.faces)
-    raw.material = material_of(entity.state, _opacity(entity, light, job), job, entity)
-    raw.emission, raw.two_sided = _emission(light, area, job)
-    return build(entity.place, _with_coordinates(entity, raw), job.files.losses)
+    entity.job.count(raw.faces)
+    raw.material = material_of(entity, _opacity(entity, light))
+    raw.emission, raw.two_sided = _emission(light, area)
+    return build(entity.place, _with_coordinates(entity, raw), entity.job.files.losses)
 
 
 def _with_coordinates(entity: Entity, raw: RawMesh) -> RawMesh:
@@ -245,20 +244,20 @@ def _with_coordinates(entity: Entity, raw: RawMesh) -> RawMesh:
     return raw
 
 
-def _opacity(entity: Entity, light: Entity | None, job: Job) -> Any:
+def _opacity(entity: Entity, light: Entity | None) -> Any:
     """Return the opacity of a shape; None where none is given."""
     if "alpha" not in entity.values:
         return None
-    alpha = clipped(scalar(entity, "alpha", 1.0, job))
+    alpha = clipped(scalar(entity, "alpha", 1.0))
     if light is None or isinstance(alpha, BaseTexture) or alpha > 0:
         return alpha
     entity.lose("alpha 0 of an area light, which pbrt does not show; it is seen")
     return None
 
 
-def _emission(light: Entity | None, area: float, job: Job) -> tuple[Any, bool]:
+def _emission(light: Entity | None, area: float) -> tuple[Any, bool]:
     """Return the radiance of an area light, and whether it leaves both sides; None if there is no light."""
-    found = None if light is None else job.convert(light)
+    found = None if light is None else light.job.convert(light)
     if light is None or found is None:
         return None, False
     radiance, luminance, both = found

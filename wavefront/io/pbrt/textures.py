@@ -13,7 +13,8 @@ from ...core.errors import SceneError
 from ...textures.base import BaseTexture
 from ...textures.image import UV_SETS, StoredImage, Texture
 from ..description.computed import Computed, Value, computed, limits_of, product
-from .entities import Entity, Job, converts, unsupported
+from ..description.entity import Entity
+from .entities import converts, spectrum, unsupported
 from .mappings import Mapped, MappedTexture, Mapping, mapping_of
 from .noise import noise
 
@@ -67,94 +68,92 @@ def fourth_root(alpha: Any) -> Any:
     return square_root(square_root(alpha))
 
 
-def color(entity: Entity, name: str, default: Any, job: Job, use: str = "albedo") -> Value:
+def color(entity: Entity, name: str, default: Any, use: str = "albedo") -> Value:
     """Return a parameter that is a number, a color or a texture."""
-    given = entity.values.get(name)
-    if given is not None and given.type == "texture":
-        return entity.or_default(
-            default, lambda: job.convert(job.refer("spectrum texture", entity.get(name, ("texture",))[0]))
-        )
-    return entity.spectrum(name, default, job, use)
+    if entity.types.get(name) == "texture":
+        return _texture(entity, name, default, "spectrum texture")
+    return spectrum(entity, name, default, use)
 
 
-def scalar(entity: Entity, name: str, default: float, job: Job) -> Value:
+def scalar(entity: Entity, name: str, default: float) -> Value:
     """Return a parameter that is a number or a texture of numbers."""
-    given = entity.values.get(name)
-    if given is not None and given.type == "texture":
-        return entity.or_default(
-            default, lambda: job.convert(job.refer("float texture", entity.get(name, ("texture",))[0]))
-        )
+    if entity.types.get(name) == "texture":
+        return _texture(entity, name, default, "float texture")
     return entity.number(name, default)
 
 
-def part(entity: Entity, name: str, default: float, job: Job) -> Value:
+def _texture(entity: Entity, name: str, default: Any, kind: str) -> Value:
+    job = entity.job
+    return entity.or_default(default, lambda: job.convert(job.refer(kind, entity.one(name, "", "texture"))))
+
+
+def part(entity: Entity, name: str, default: float) -> Value:
     """Return a parameter of a texture, of its own kind."""
-    if entity.kind == "float texture":
-        return scalar(entity, name, default, job)
-    return color(entity, name, default, job, "unbounded")
+    if entity.variant == "float":
+        return scalar(entity, name, default)
+    return color(entity, name, default, "unbounded")
 
 
-converts("texture", "constant")(lambda entity, job: part(entity, "value", 1.0, job))
+converts("texture", "constant")(lambda entity: part(entity, "value", 1.0))
 
 
 @converts("texture", "scale")
-def _scale(entity: Entity, job: Job) -> Value:
-    factor, value = scalar(entity, "scale", 1.0, job), part(entity, "tex", 1.0, job)
+def _scale(entity: Entity) -> Value:
+    factor, value = scalar(entity, "scale", 1.0), part(entity, "tex", 1.0)
     if isinstance(value, Texture) and np.ndim(factor) == 0 and not isinstance(factor, BaseTexture):
         return _scaled(value, float(factor))
     return computed(product, value, factor)
 
 
 @converts("texture", "mix")
-def _mix(entity: Entity, job: Job) -> Value:
-    one, two = (part(entity, f"tex{i}", i - 1.0, job) for i in (1, 2))
-    return _between(one, two, scalar(entity, "amount", 0.5, job))
+def _mix(entity: Entity) -> Value:
+    one, two = (part(entity, f"tex{i}", i - 1.0) for i in (1, 2))
+    return _between(one, two, scalar(entity, "amount", 0.5))
 
 
 @converts("texture", "checkerboard")
-def _checkerboard(entity: Entity, job: Job) -> Value:
-    one, two = (part(entity, f"tex{i}", 2.0 - i, job) for i in (1, 2))
+def _checkerboard(entity: Entity) -> Value:
+    one, two = (part(entity, f"tex{i}", 2.0 - i) for i in (1, 2))
     if entity.whole("dimension", 2, 2, 3) == 3:
         entity.lose("dimension 3; the mean in its place")
         return _between(one, two, 0.5)
     fields = np.array([[1.0, 0.0], [0.0, 1.0]], np.float32)  # the top row is v > 1/2
-    mapping = mapping_of(entity, job)
+    mapping = mapping_of(entity)
     transform = mapping.transform * np.array([[0.5], [0.5], [1]])  # four fields in a unit square
     texture = MappedTexture(fields, filter="nearest", transform=transform, channel=0, uv_set=mapping.uv_set)
     texture.mapping = mapping
     return _between(one, two, texture)
 
 
-@converts("texture", "imagemap")
-def _imagemap(entity: Entity, job: Job) -> Value:
-    entity.harmless("maxanisotropy")
-    numbers = entity.kind == "float texture"
-    return image(entity, job, "luminance" if numbers else None)
+@converts("texture", "imagemap", harmless="maxanisotropy")
+def _imagemap(entity: Entity) -> Value:
+    numbers = entity.variant == "float"
+    return image(entity, "luminance" if numbers else None)
 
 
 @converts("texture", "bilerp")
-def _bilerp(entity: Entity, job: Job) -> Value:
+def _bilerp(entity: Entity) -> Value:
     """Return a texture of four values at the corners of the unit square, which goes on beyond it."""
     corners = [
         entity.number(name, value)
-        if entity.kind == "float texture"
-        else entity.spectrum(name, value, job, "unbounded")
+        if entity.variant == "float"
+        else spectrum(entity, name, value, "unbounded")
         for name, value in (("v00", 0.0), ("v01", 1.0), ("v10", 0.0), ("v11", 1.0))
     ]
-    return computed(bilinear, *corners, *_coordinates(entity, job), rising=False)
+    return computed(bilinear, *corners, *_coordinates(entity), rising=False)
 
 
 @converts("texture", "dots")
-def _dots(entity: Entity, job: Job) -> Value:
-    inside, outside = part(entity, "inside", 1.0, job), part(entity, "outside", 0.0, job)
-    inner = Computed(inside_dots, *_coordinates(entity, job), limits=(0.0, 1.0))
+def _dots(entity: Entity) -> Value:
+    inside, outside = part(entity, "inside", 1.0), part(entity, "outside", 0.0)
+    inner = Computed(inside_dots, *_coordinates(entity), limits=(0.0, 1.0))
     return _between(outside, inside, inner)
 
 
 @converts("texture", "directionmix")
-def _direction_mix(entity: Entity, job: Job) -> Value:
-    one, two = (part(entity, f"tex{i}", i - 1.0, job) for i in (1, 2))
-    direction = (job.world @ entity.matrix)[:3, :3] @ entity.vector("dir", (0.0, 1.0, 0.0))
+def _direction_mix(entity: Entity) -> Value:
+    one, two = (part(entity, f"tex{i}", i - 1.0) for i in (1, 2))
+    direction = (entity.job.world @ entity.matrix)[:3, :3] @ entity.vector("dir", (0.0, 1.0, 0.0))
     size = np.linalg.norm(direction)
     if not size > 0:
         raise SceneError("dir must not be zero")
@@ -183,10 +182,10 @@ def inside_dots(s: Any, t: Any) -> Any:
     return (there & (x * x + y * y < f4(DOT * DOT))).astype(f4)
 
 
-def image(entity: Entity, job: Job, channel: str | None) -> Texture:
+def image(entity: Entity, channel: str | None) -> Texture:
     """Return an image texture."""
     file = entity.text("filename", "")
-    codes, name = job.picture(entity, file)
+    codes, name = entity.job.picture(entity, file)
     encoding = entity.text("encoding", "sRGB" if file.lower().endswith(".png") else "linear")
     if codes.dtype.kind == "u" and encoding.startswith("gamma"):
         exponent = _exponent(encoding)
@@ -197,7 +196,7 @@ def image(entity: Entity, job: Job, channel: str | None) -> Texture:
     if wrap == "black":
         entity.lose("wrap 'black'; 'clamp' in its place")
     kind = entity.choice("filter", "bilinear", ("bilinear", "point", "trilinear", "ewa", "EWA"))
-    mapping = mapping_of(entity, job)
+    mapping = mapping_of(entity)
     texture = MappedTexture(
         StoredImage(codes, name),
         srgb=encoding == "sRGB",
@@ -206,7 +205,7 @@ def image(entity: Entity, job: Job, channel: str | None) -> Texture:
         transform=mapping.transform,
         channel=channel,  # type: ignore[arg-type]
         uv_set=mapping.uv_set,
-        max_pixels=job.files.limits.pixels,
+        max_pixels=entity.job.files.limits.pixels,
     )
     texture.mapping = mapping
     scaled = _scaled(texture, entity.number("scale", 1.0))
@@ -239,7 +238,7 @@ def _between(one: Value, two: Value, amount: Value) -> Value:
     return value
 
 
-def _coordinates(entity: Entity, job: Job) -> tuple[Coordinate, Coordinate]:
+def _coordinates(entity: Entity) -> tuple[Coordinate, Coordinate]:
     """Return both texture coordinates."""
-    mapping = mapping_of(entity, job)
+    mapping = mapping_of(entity)
     return Coordinate(mapping, 0), Coordinate(mapping, 1)

@@ -11,8 +11,9 @@ from ...camera.projection import Orthographic, Panorama, Perspective, Projection
 from ...core.errors import SceneError, exact
 from ...sampling.filters import BoxFilter, GaussianFilter, TentFilter
 from ...shapes.transform import Matrix
+from ..description.entity import Entity
 from ..description.views import angle_of, half_tangent
-from .entities import Entity, Job, converts, unsupported
+from .entities import converts, unsupported
 
 Settings = dict[str, Any]
 TALL = 1e-3  # relative difference of a pixel's sides that is taken for rounding
@@ -29,25 +30,27 @@ def mirror_of(camera: Entity) -> Matrix:
     return np.diag([-1.0 if mirrored else 1.0, 1, 1, 1])
 
 
-@converts("camera", "spherical")
-def _spherical(entity: Entity, job: Job) -> Camera:
+@converts(
+    "camera",
+    "spherical",
+    harmless="shutteropen shutterclose lensradius focaldistance frameaspectratio screenwindow",
+)
+def _spherical(entity: Entity) -> Camera:
     """Return a camera that sees all directions: its left edge shows x, and a quarter of its width z."""
-    entity.harmless("shutteropen shutterclose lensradius focaldistance frameaspectratio screenwindow")
     if entity.choice("mapping", "equalarea", ("equalarea", "equirectangular")) == "equalarea":
         entity.lose("mapping 'equalarea'; 'equirectangular' in its place")
-    size, crop = job.film
-    matrix = job.world @ entity.matrix
+    size, crop = entity.job.film
+    matrix = entity.job.world @ entity.matrix
     x, y, z = (matrix[:3, i] / np.linalg.norm(matrix[:3, i]) for i in range(3))
     return Camera(matrix[:3, 3], np.stack([-z, y, x], 1), Panorama(), size, crop)
 
 
-@converts("camera", "perspective orthographic realistic")
-def _camera(entity: Entity, job: Job) -> Camera:
+@converts("camera", "perspective orthographic realistic", harmless="shutteropen shutterclose")
+def _camera(entity: Entity) -> Camera:
     """Return a camera for the size and the crop of the film."""
-    (width, height), crop = job.film
-    entity.harmless("shutteropen shutterclose")
+    (width, height), crop = entity.job.film
     x0, x1, y0, y1 = _window(entity, width / height)
-    matrix = job.world @ entity.matrix
+    matrix = entity.job.world @ entity.matrix
     scale = np.linalg.norm(matrix[:3, :3], axis=0)
     if np.ptp(scale) > TALL * scale.max():
         entity.lose("a transform that scales unevenly")
@@ -82,7 +85,7 @@ def _camera(entity: Entity, job: Job) -> Camera:
 def _window(entity: Entity, aspect: float) -> tuple[float, ...]:
     """Return the left, right, lower and upper edge of the screen: 1 is at half the angle of view."""
     aspect = entity.number("frameaspectratio", aspect, lambda x: x > 0, "above 0")
-    given = entity.array("screenwindow", ("float",))
+    given = entity.get("screenwindow", None, "float")
     if given is None:
         wide, high = max(aspect, 1.0), max(1 / aspect, 1.0)
         return -wide, wide, -high, high
@@ -102,14 +105,17 @@ def exposure_of(film: Entity | None, camera: Entity | None) -> float:
     return time * (1.0 if film is None else film.number("iso", 100.0, lambda x: x > 0, "above 0") / 100)
 
 
-@converts("film", "rgb gbuffer spectral")
-def _film(entity: Entity, job: Job) -> tuple[tuple[int, int], tuple[int, ...] | None]:
+@converts(
+    "film",
+    "rgb gbuffer spectral",
+    harmless="filename savefp16 diagonal coordinatesystem nbuckets lambdamin lambdamax iso",
+)
+def _film(entity: Entity) -> tuple[tuple[int, int], tuple[int, ...] | None]:
     """Return the size and the crop."""
-    entity.harmless("filename savefp16 diagonal coordinatesystem nbuckets lambdamin lambdamax iso")
     size = (entity.whole("xresolution", 1280, 1, 2**16), entity.whole("yresolution", 720, 1, 2**16))
     if entity.text("sensor", "cie1931") != "cie1931":
         entity.lose("sensor; 'cie1931' in its place")
-    bounds, window = (entity.array(name, (kind,)) for name, kind in _CROPS)
+    bounds, window = (entity.get(name, None, kind) for name, kind in _CROPS)
     if window is not None:
         if len(window) != 4:
             entity.lose(f"cropwindow has {len(window)} numbers; it must have 4; left out")
@@ -131,7 +137,7 @@ RADII = {"box": 0.5, "triangle": 2.0, "gaussian": 1.5}  # of filters, pixels, if
 
 
 @converts("filter", "box triangle gaussian")
-def _filter(entity: Entity, job: Job) -> Settings:
+def _filter(entity: Entity) -> Settings:
     radius, up = (entity.number(name, RADII[entity.type]) for name in ("xradius", "yradius"))
     if up != radius:
         entity.lose(f"yradius; {radius:g} in its place")
@@ -144,17 +150,23 @@ def _filter(entity: Entity, job: Job) -> Settings:
 unsupported("filter", "mitchell sinc")
 
 
-@converts("sampler", "halton independent paddedsobol pmj02bn sobol stratified zsobol")
-def _sampler(entity: Entity, job: Job) -> Settings:
-    entity.harmless("randomization seed jitter")
+@converts(
+    "sampler",
+    "halton independent paddedsobol pmj02bn sobol stratified zsobol",
+    harmless="randomization seed jitter",
+)
+def _sampler(entity: Entity) -> Settings:
     if entity.type == "stratified":
         return {"spp": entity.whole("xsamples", 4, 1, 2**15) * entity.whole("ysamples", 4, 1, 2**15)}
     return {"spp": entity.whole("pixelsamples", 16, 1)}
 
 
-@converts("integrator", "path simplepath volpath simplevolpath bdpt mlt sppm lightpath")
-def _integrator(entity: Entity, job: Job) -> Settings:
-    entity.harmless("lightsampler samplelights samplebsdf visualizestrategies visualizeweights")
+@converts(
+    "integrator",
+    "path simplepath volpath simplevolpath bdpt mlt sppm lightpath",
+    harmless="lightsampler samplelights samplebsdf visualizestrategies visualizeweights",
+)
+def _integrator(entity: Entity) -> Settings:
     if entity.type in ("bdpt", "mlt", "sppm", "lightpath"):
         entity.lose("path tracing in its place")
         entity.unread &= {"maxdepth"}
