@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from ..arrays.vec import Bools, Floats, Ints
 from .base import Accelerator, Intersections
+from .plate import surely_occluded
 
 
 class RayCounter:
@@ -23,3 +24,10 @@ class RayCounter:
         """Return True for each of the rays (3, n) that something blocks."""
         self.shadow += origin.shape[1]
         return self._accelerator.occluded(origin, direction, distance, exclude_prim)
+
+    def surely_occluded(
+        self, origin: Floats, direction: Floats, distance: Floats, exclude_prim: Ints
+    ) -> tuple[Bools, Bools]:
+        """Return which rays hit something opaque, (n,), and which others may be blocked, (n,)."""
+        self.shadow += origin.shape[1]
+        return surely_occluded(self._accelerator, origin, direction, distance, exclude_prim)

@@ -116,6 +116,9 @@ def find_alpha(
     start = 0
     for mesh in meshes:
         end = start + len(mesh.faces)
+        opacity = mesh.material.opacity
+        if opacity is not None and mesh.uvs is not None and found[start:end].any():
+            found[start:end] &= ~opacity.is_one_over(mesh.uvs.take(mesh.faces, 0))
         found[start:end] |= id(mesh) in placed
         start = end
     return found

@@ -92,6 +92,8 @@ class Feature:
     dimensions
         Numbers that `sampler.draw_1d` and `draw_2d` take for features of your own. Two of one render must not
         draw by the same one.
+    spares_opaque
+        No ray may pass primitives that have no alpha (`Facts.has_alpha`).
     compared
         Two renders must have it in common so that one can go on from the checkpoint of the other. False where
         it follows from settings, which are compared by themselves.
@@ -111,6 +113,7 @@ class Feature:
     camera_only: ClassVar[bool] = False
     drawn: ClassVar[bool] = False
     dims_shadows: ClassVar[bool] = False
+    spares_opaque: ClassVar[bool] = False
     compared: ClassVar[bool] = True
     shading: ClassVar[Any] = None
     ways: int = 1

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from ..accel import Accelerator, Geometry, InstanceAccelerator
+from ..accel.plate import beside_plate
 from ..arrays.soa import soa
 from ..arrays.vec import Bools, Doubles, Floats, Ints
 from ..camera import Camera
@@ -182,7 +183,7 @@ def gather_scene(
     shape_numbers = number_shapes(meshes, curved, instances, numbers)
     interchangeable = None if weights else same_as_next(material_of[:once], light_of[:once], shape_of)
     geometry = Geometry(triangles[:once], table_of_curved.kinds, weights, interchangeable)
-    accelerator, table = make_accelerator(geometry), None
+    accelerator, table = beside_plate(make_accelerator, geometry, has_alpha), None
     if shared:
         placements, table = place_instances(instances, shared, center, once, len(table_of_curved), replaced)
         ends = np.cumsum([len(mesh.faces) for mesh in shared])

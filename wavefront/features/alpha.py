@@ -17,6 +17,7 @@ class Alpha(Feature):
     """Lets a part of the light pass surfaces with an alpha."""
 
     dims_shadows = True
+    spares_opaque = True
     opacities: Opacities
 
     @classmethod

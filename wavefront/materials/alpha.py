@@ -7,9 +7,10 @@ from typing import Any
 import numpy as np
 
 from ..arrays.state import SurfaceInteraction
-from ..arrays.vec import Floats, f4
+from ..arrays.vec import Bools, Doubles, Floats, f4
 from ..core.errors import SceneError
 from ..textures.base import BaseTexture
+from ..textures.image import Texture
 from ..textures.parameter import Scalar, scalar
 
 
@@ -37,6 +38,15 @@ class Opacity:
         if isinstance(self.alpha, BaseTexture):
             return self._resolved(self.alpha.at(surface))
         return np.repeat(self._resolved(self.alpha), len(surface))
+
+    def is_one_over(self, uvs: Doubles) -> Bools:
+        """Return whether the opacity is 1 all over triangles, given by texture coordinates (m, 3, 2).
+
+        Where that is not known it is False.
+        """
+        if not isinstance(self.alpha, Texture) or self.alpha.uv_set:
+            return np.zeros(len(uvs), np.bool_)
+        return self.alpha.is_one_within(uvs.min(1).T, uvs.max(1).T)
 
     def _resolved(self, alpha: Floats) -> Floats:
         if self.cutoff is None:

@@ -23,7 +23,8 @@ from ..core.errors import SceneError, in_brief, one_of
 from ..core.suggestions import suggests_keywords
 from ..lights import Environment, Light, Sky
 from ..materials import Material
-from ..shapes import Disk, Mesh
+from ..shapes import Mesh
+from ..shapes.plate import plate
 from ..textures.image import Texture
 from .scene import Scene, turned_up
 
@@ -293,7 +294,7 @@ def lighted(
 
 
 def _ground(scene: Scene, preset: str | None, up: ArrayLike, kind: type[Diffuse]) -> Mesh:
-    """Return a level disk of a kind of surface under a scene, that fades out towards its rim.
+    """Return a level surface of some kind under a scene, that fades out towards the rim of a disk.
 
     Outside of shadows it is as bright as the lower half of the preset's environment, so neither an edge nor a
     horizon is visible.
@@ -310,7 +311,7 @@ def _ground(scene: Scene, preset: str | None, up: ArrayLike, kind: type[Diffuse]
     texels = np.linspace(-1, 1, 129)
     rim = np.sqrt(texels[:, None] * texels[:, None] + texels * texels)
     alpha = smoothstep((1 - rim) / (1 - GROUND_FADE))
-    return Disk(
+    return plate(
         center - vertical * depth * (1 + GROUND_GAP),
         vertical,
         GROUND_REACH * radius,

@@ -8,6 +8,7 @@ from typing import TypeAlias, TypeVar
 
 import numpy as np
 
+from ..accel.plate import surely_occluded
 from ..arrays.state import Hits, Rays, SurfaceInteraction
 from ..arrays.vec import ALL, Bools, Floats, Lanes, dot, f4, take
 from ..compile.program import Feature, Passage
@@ -27,13 +28,15 @@ def transmittance_along(scene: CompiledScene, rays: ShadowRays, veils: Veils | N
     """
     veils = scene.program.see_through if veils is None else veils
     part = np.ones_like(rays.direction)
-    seen = visible(scene, rays)
+    blocked, perhaps = _blockers(scene, rays, veils)
+    part[:, np.flatnonzero(blocked)] = 0
+    seen = ~(blocked | perhaps)
     for dim in scene.program.dim:
         free = np.flatnonzero(seen)
         some, left = rays.take(free), take(part, free)
         dim(left, scene, some, some.distance, np.ones(free.size, np.bool_))
         part[:, free] = left
-    lanes = np.flatnonzero(~seen)
+    lanes = np.flatnonzero(perhaps)
     if not veils:
         part[:, lanes] = 0
         return part
@@ -65,6 +68,15 @@ def transmittance_along(scene: CompiledScene, rays: ShadowRays, veils: Veils | N
         on = np.flatnonzero(left.max(0) != 0)
         lanes, rays = lanes.take(on), rays.take(on)
     return part
+
+
+def _blockers(scene: CompiledScene, rays: ShadowRays, veils: Veils) -> tuple[Bools, Bools]:
+    """Return which rays (n,) no veil lets pass what they hit, and which others hit anything."""
+    if not all(veil.spares_opaque for veil in veils):
+        return np.zeros(len(rays), np.bool_), ~visible(scene, rays)
+    return surely_occluded(
+        scene.accelerator, rays.origin, rays.direction, shadow_ray_length(rays), rays.exclude_prim
+    )
 
 
 def passable(scene: CompiledScene, rays: Rays, hits: Hits, lanes: Lanes, veils: Veils) -> Bools:

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ..arrays.state import SurfaceInteraction
-from ..arrays.vec import Doubles, Floats, Ints, f4, luminance
+from ..arrays.vec import Bools, Doubles, Floats, Ints, f4, luminance
 from ..codecs.budget import Budget
 from ..codecs.images import read_codes
 from ..colors import srgb_to_linear
@@ -27,6 +27,7 @@ UV_SETS = ("uv", "uv1")  # fields of `SurfaceInteraction`
 
 ONE = -1  # in place of a stored channel: alpha of a picture that has none
 CHUNK = 1 << 20  # texels that are read at a time
+ROUNDING = 2.0**-8  # of places in texels, at most
 
 
 class Texture(BaseTexture):
@@ -169,6 +170,36 @@ class Texture(BaseTexture):
             values = self._shaped([self._decoded(texels, k) for k in range(len(self._channels))])
             low, high = min(low, float(values.min())), max(high, float(values.max()))
         return low, high
+
+    def is_one_within(self, low: Doubles, high: Doubles) -> Bools:
+        """Return whether one channel is 1 at all coordinates from `low` to `high` (2, m), a mask (m,).
+
+        It is False where that is not known: of large images, or coordinates that are transformed or wrapped.
+        """
+        width, height = self.size
+        changed = self.transform is not None or (self.scale != 1).any() or (self.offset != 0).any()
+        if not self.scalar or changed or width * height > CHUNK:
+            return np.zeros(low.shape[1], np.bool_)
+        values = self._shaped(
+            [self._decoded(np.arange(width * height), k) for k in range(len(self._channels))]
+        )
+        others = np.zeros(
+            (height + 1, width + 1), np.intp
+        )  # texels above and left of each corner that are not 1
+        np.cumsum(np.cumsum(values.reshape(height, width) != 1, 0), 1, out=others[1:, 1:])
+        known = (low.min(0) >= 0) & (high.max(0) <= 1)
+        ends = []
+        for size, wrap, start, stop in (
+            (width, self.wrap[0], low[0], high[0]),
+            (height, self.wrap[1], 1 - high[1], 1 - low[1]),
+        ):
+            before = np.floor(np.where(known, start, 0) * size - (0.5 + ROUNDING)).astype(np.intp)
+            after = np.floor(np.where(known, stop, 0) * size - (0.5 - ROUNDING)).astype(np.intp) + 2
+            known &= (wrap != "repeat") | ((before >= 0) & (after <= size))
+            ends.append((np.clip(before, 0, size), np.clip(after, 0, size)))
+        (left, right), (top, bottom) = ends
+        count = others[bottom, right] - others[top, right] - others[bottom, left] + others[top, left]
+        return known & (count == 0)
 
     def _shaped(self, rows: list[Floats]) -> Floats:
         """Return channel values (n,) as (3, n) or (n,), scaled and offset."""
