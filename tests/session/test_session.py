@@ -435,3 +435,11 @@ def test_the_caller_shows_progress_and_can_stop_within_a_wave(monkeypatch: pytes
         session.set_camera(None)
         assert session.run().spp == 4
     assert told[-1] == told[3 + told[3:].index(max(told))] == max(told) > 0
+
+
+def test_a_line_says_that_something_is_tried_only_while_it_is(calls_of: Any, monkeypatch: Any) -> None:
+    calls = calls_of("wavefront.drive.choice.phase")
+    monkeypatch.setattr("wavefront.drive.choice.LEAST_PIXELS", 64 * 64)
+    for side, said in ((63, 0), (64, 1)):
+        wf.render(scenes.cornell_box(), 1, size=(side, side), executor="threads")
+        assert len(calls) == said

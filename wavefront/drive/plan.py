@@ -14,7 +14,7 @@ from ..core.errors import SceneError
 from ..core.memory import check_memory, megabytes, resident_memory
 from ..core.plural import plural
 from ..film.aov_names import LUX, aov_of
-from ..film.picture_sums import empty_sums
+from ..film.picture_sums import PictureSums, empty_sums
 from ..film.sums import bytes_per_pixel
 from ..guiding import GuideTable
 from ..integrators import INTEGRATORS
@@ -132,6 +132,10 @@ class Plan:
     budget: Budget
     inline: bool = False  # the picture is one wave, which the caller traces
     choice: Choice = NO_CHOICE  # until there is one
+
+    def sums(self, size: Sequence[int]) -> PictureSums:
+        """Return the sums of no samples for a picture of a size (width, height)."""
+        return empty_sums(size, self.tracer.recorded_aovs, self.settings.values["caustics"])
 
 
 def with_choice(plan: Plan, camera: Camera) -> Plan:

@@ -7,7 +7,6 @@ import shlex
 import threading
 import time
 from collections.abc import Iterator
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 from functools import partial
 from typing import Any, Self, Unpack
@@ -19,7 +18,7 @@ from ..core.errors import RenderError, SceneError, warn_caller
 from ..core.interrupt import InterruptHandler
 from ..core.shared import STOP, SharedInt
 from ..core.suggestions import suggests_keywords
-from ..film.picture_sums import PictureSums, empty_sums
+from ..film.picture_sums import PictureSums
 from ..image import Image
 from ..io.to_scene import as_scene, choose_camera, coloring_of
 from ..settings import RenderSettings, Settings, describes_settings, takes_settings
@@ -157,28 +156,16 @@ class Session:
             settings = self._settings = settings.ending(self._scene.light_is_chosen)
         self._hints = Hints(settings, self._scene)
         table = learn_guide(settings, self._scene.compiled, camera)
-        self._plan = make_plan(settings, self._scene, camera, table)
+        self._plan = with_choice(make_plan(settings, self._scene, camera, table), camera)
         self._make_pool()
         try:
             with self.interrupt_handler:
                 self._pool.start()  # before there are sums, of which forked processes would keep old copies
-                self._begin_first_picture(camera, begin)
+                self._begin_picture(camera, self._plan.sums(camera.size), begin)
         except BaseException:
             with self.interrupt_handler:
                 self._pool.close()
             raise
-
-    def _begin_first_picture(self, camera: Camera, begin: float) -> None:
-        """Choose how paths go on; meanwhile a thread takes the memory of large pictures."""
-        of_sums = camera.size, self._plan.tracer.recorded_aovs, self._settings.values["caustics"]
-        if self._plan.inline:
-            self._plan = with_choice(self._plan, camera)
-            self._begin_picture(camera, empty_sums(*of_sums), begin)
-            return
-        with ThreadPoolExecutor(1) as aside:
-            sums = aside.submit(empty_sums, *of_sums)
-            self._plan = with_choice(self._plan, camera)
-        self._begin_picture(camera, sums.result(), begin)
 
     def _make_pool(self) -> None:
         """Make a pool of workers, which start with the first job if not before."""
@@ -328,7 +315,7 @@ class Session:
         self._scene.compiled.view(camera)  # checks its distance
         executor = settings.executor_for(camera.size)
         budget = budget_of(settings, camera.size, executor, self._plan.tracer.recorded_aovs)
-        sums = empty_sums(camera.size, self._plan.tracer.recorded_aovs, values["caustics"])
+        sums = self._plan.sums(camera.size)
         with self.interrupt_handler, self._use:
             self._work.discard()
             self._stopped = self._dropped = False  # a stop from now on is one of the new picture
