@@ -4,14 +4,16 @@ python benchmarks/equal_error.py [--scenes NAME ...] [--settings "branches=4" ..
 
 Scenes are those of the examples, of hard_scenes.py, random_rooms.py and many_lights.py, some of the tests,
 and meshes; `--list` prints their names. Each is rendered by one thread with several seeds, plain
-(`branches=1, reuse=False`) and with each of the given settings in turn; without `--settings` with the default
-ones. Printed are, relative to plain: variance of a pixel over the seeds, CPU time of the whole call, and
-gain, which is plain variance times CPU time over the other: 1.00 is neither sooner nor later. The gain is
-given for pixels and for the picture after a blur of 1.5 and of 4 pixels, since pixels may share their noise.
-Variance is relative to the squared mean around a pixel, plus a hundredth of the picture's; the noisiest
-thousandth of the pixels count as the one next to them. What training a guide, and finding out what pays,
-takes is part of the time. What pays is found out with the first seed for all renders, since a mean over
-renders of different kinds would say nothing; `--decide` is another seed for that.
+(`branches=1, reuse=False`) and with each of the given settings in turn; without `--settings` with the
+default ones. Printed are, relative to plain: variance of a pixel over the seeds, CPU time of the whole call,
+and gain, which is plain variance times CPU time over the other: 1.00 is neither sooner nor later. The gain
+is given for pixels and for the picture after a blur of 1.5 and of 4 pixels, since pixels may share their
+noise. Variance is relative to the squared mean around a pixel, plus a hundredth of the picture's; the
+noisiest thousandth of the pixels count as the one next to them. The error of the gain of pixels is that by
+the jackknife over 36 parts of the picture. CPU times are ratios of runs that follow each other, their
+median. What training a guide, and finding out what pays, takes is part of the time. What pays is found out
+with the first seed for all renders, since a mean over renders of different kinds would say nothing;
+`--decide` is another seed for that.
 """
 
 from __future__ import annotations
@@ -49,6 +51,7 @@ from cornell_box import cornell_box
 ROOT = Path(__file__).resolve().parents[1]
 PLAIN = {"branches": 1, "reuse": False}
 BLURS = (0, 1.5, 4)  # pixels
+PARTS = 6  # of the picture, in each direction
 EXAMPLES = (
     "course_spheres",
     "cuboids",
@@ -268,15 +271,23 @@ def decide_with(seed: int) -> None:
     plan.choose = choose_alike
 
 
-def errors(pictures: list[np.ndarray], mean: np.ndarray) -> np.ndarray:
-    """Return the relative variance of pictures (H, W, 3) after each blur."""
+def errors(pictures: list[np.ndarray], mean: np.ndarray) -> list[np.ndarray]:
+    """Return the relative variance (36,) of parts of pictures (H, W, 3) after each blur."""
     found = []
     scale = gaussian_filter(mean, (4, 4, 0)) ** 2 + 0.01 * mean.mean() ** 2
     for blur in BLURS:
         smooth = [gaussian_filter(each, (blur, blur, 0)) if blur else each for each in pictures]
         variance = np.var(smooth, axis=0, ddof=1) / scale
-        found.append(np.minimum(variance, np.quantile(variance, 0.999)).mean())
-    return np.array(found)
+        variance = np.minimum(variance, np.quantile(variance, 0.999))
+        rows = [part for row in np.array_split(variance, PARTS) for part in np.array_split(row, PARTS, 1)]
+        found.append(np.array([part.sum() for part in rows]) / variance.size)
+    return found
+
+
+def ratio_error(above: np.ndarray, below: np.ndarray) -> float:
+    """Return the standard error of the ratio of two sums over parts, by the jackknife."""
+    without = (above.sum() - above) / (below.sum() - below)
+    return float(np.sqrt((above.size - 1) * np.var(without)))
 
 
 def measure(name: str, options: argparse.Namespace) -> None:
@@ -297,16 +308,15 @@ def measure(name: str, options: argparse.Namespace) -> None:
             pictures[side].append(image.rgb.astype(np.float64))
             chosen[side] = "shared" if image.metadata["reuse"] else str(image.metadata["branches"])
     mean = np.mean([picture for each in pictures.values() for picture in each], axis=0)
-    plain, plain_time = errors(pictures["plain"], mean), median(seconds["plain"])
+    plain = errors(pictures["plain"], mean)
     for side in options.settings:
-        variance = errors(pictures[side], mean) / plain
-        cpu = median(seconds[side]) / plain_time
-        gains = " | ".join(f"{1 / (each * cpu):.2f}" for each in variance)
-        label = f"`{side}`" if side else "default"
-        print(
-            f"| {name} | {label} | {variance[0]:.2f} | {cpu:.2f} | {gains} | {chosen[side].strip()} |",
-            flush=True,
-        )
+        found = errors(pictures[side], mean)
+        cpu = median(np.divide(seconds[side], seconds["plain"]))
+        gains = [one.sum() / other.sum() / cpu for one, other in zip(plain, found, strict=True)]
+        error = ratio_error(plain[0], found[0]) / cpu
+        label, variance = f"`{side}`" if side else "default", found[0].sum() / plain[0].sum()
+        gain = f"{gains[0]:.2f} ± {error:.2f} | {gains[1]:.2f} | {gains[2]:.2f}"
+        print(f"| {name} | {label} | {variance:.2f} | {cpu:.2f} | {gain} | {chosen[side]} |", flush=True)
 
 
 def main() -> None:

@@ -143,7 +143,7 @@ def chosen(scene: wf.Scene, **settings: Any) -> choice.Choice:
 
 
 def pretend(
-    monkeypatch: pytest.MonkeyPatch, variance: float = 0.1, bright: float = 0.0, **found: Any
+    monkeypatch: pytest.MonkeyPatch, variance: float = 0.1, bright: float = 0.1, **found: Any
 ) -> list[bool]:
     """Have tuning runs find a variance and more; return whether each was guided.
 
@@ -154,7 +154,7 @@ def pretend(
     def pretended(*args: Any, table: Any = None, **options: Any) -> Run:
         tried.append(table is not None)
         values, few = np.full(100, variance), int(OUTLIERS * 100)
-        values[:few] = variance + bright / (1 - bright) * values.sum() / few
+        values[:few] = bright / (1 - bright) * values[few:].sum() / few
         parts = {name: found.get(name, part) * values for name, part in (("common", 0.05), ("own", 0.0))}
         real = run(*args, **options)
         met = np.zeros_like(real.met)
@@ -196,7 +196,10 @@ def with_glass(size: tuple[int, int]) -> wf.Scene:
         ({"narrow": 0.021}, False),
         ({"narrow": 0.021, "variance": 0.71}, True),
         ({"narrow": 0.021, "variance": 0.69}, False),
-        ({"bright": 0.9}, True),
+        ({"narrow": 0.021, "variance": 0.71, "bright": 0.49}, True),
+        ({"narrow": 0.021, "variance": 0.71, "bright": 0.51}, False),
+        ({"narrow": 0.02, "variance": 0.71, "bright": 0.9}, True),
+        ({"narrow": 0.02, "bright": 0.9}, True),
     ],
     ids=str,
 )

@@ -29,6 +29,7 @@ GUIDE_HINT = "most light is hard to find here: guide=True may pay (docs/guiding.
 GAIN_OF_GUIDE = 0.85  # variance times rays must fall below this part: rays tell the cost to about a tenth
 GAIN_OF_BRANCHES = 0.95  # likewise; one run tells the costs of both numbers
 BRIGHT_SPOTS = 0.6  # part of the variance in few pixels from where on branches only meet more bright spots
+BRIGHT_SPOTS_OF_SHARED = 0.5  # likewise of shared paths, beside narrow lobes: they spread spots over a tile
 GUIDE_TILES = 128  # whatever the size of the picture: training takes longer anyway
 RARE_LIGHT = 0.7  # relative variance of a pixel of four samples, from where on light is hard to find
 MOST_PATHS = 0.4  # part of the paths that must meet second points which can be shared
@@ -121,14 +122,17 @@ def _sharing_pays(scene: CompiledScene, found: Run, light_is_rare: bool) -> bool
     """Return whether sharing paths pays: most of them can be shared, and these make the noise.
 
     Mirrors, glass and narrow lobes at second points make bright spots, which no pixel can share. They are
-    most of the noise unless all light is hard to find.
+    most of the noise unless all light is hard to find; narrow lobes may be even then.
     """
     alone = ~(shared_materials(scene) | glossy_materials(scene))
     if not can_reuse(scene) or found.met[~alone].sum() < MOST_PATHS * found.paths:
         return False
     if found.share_of_own() > OWN_LIGHT:
         return False
-    return light_is_rare or (not alone.any() and found.narrow <= NARROW_LOBES * found.paths)
+    wide = found.narrow <= NARROW_LOBES * found.paths
+    if light_is_rare:
+        return wide or found.share_of_outliers() < BRIGHT_SPOTS_OF_SHARED
+    return wide and not alone.any()
 
 
 def _branched(settings: Settings, camera: Camera, found: Run, choice: Choice) -> Choice:

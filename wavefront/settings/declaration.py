@@ -429,8 +429,8 @@ class RenderSettings(TypedDict, total=False):
             "Share paths among pixels: what a path finds from its second surface on counts for sixteen "
             'pixels that lie a little apart; only for "full". It pays where most noise is in indirect '
             "light between matte surfaces. The errors of such pixels depend on each other: docs/reuse.md "
-            'has figures. "auto" shares paths where a short tuning run says that it pays; with glossy '
-            "materials or glass only where light is hard to find: docs/choices.md tells how.",
+            'has figures. "auto" shares paths where a short tuning run says that it pays; beside glass '
+            "or much gloss only where light is hard to find: docs/choices.md tells how.",
             check=auto_or(flag),
             option="share paths among pixels: yes, no, or auto: a tuning run finds whether it pays",
         ),
