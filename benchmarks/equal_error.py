@@ -10,10 +10,10 @@ and gain, which is plain variance times CPU time over the other: 1.00 is neither
 is given for pixels and for the picture after a blur of 1.5 and of 4 pixels, since pixels may share their
 noise. Variance is relative to the squared mean around a pixel, plus a hundredth of the picture's; the
 noisiest thousandth of the pixels count as the one next to them. The error of the gain of pixels is that by
-the jackknife over 36 parts of the picture. CPU times are ratios of runs that follow each other, their
-median. What training a guide, and finding out what pays, takes is part of the time. What pays is found out
-with the first seed for all renders, since a mean over renders of different kinds would say nothing;
-`--decide` is another seed for that.
+the jackknife over 36 parts of the picture. CPU times are the least of all seeds, as other work on the
+machine only adds to them. What training a guide, and finding out what pays, takes is part of the time. What
+pays is found out with the first seed for all renders, since a mean over renders of different kinds would say
+nothing; `--decide` is another seed for that.
 """
 
 from __future__ import annotations
@@ -29,7 +29,6 @@ from collections.abc import Callable
 from copy import copy
 from functools import partial
 from pathlib import Path
-from statistics import median
 from typing import Any
 
 import numpy as np
@@ -311,7 +310,7 @@ def measure(name: str, options: argparse.Namespace) -> None:
     plain = errors(pictures["plain"], mean)
     for side in options.settings:
         found = errors(pictures[side], mean)
-        cpu = median(np.divide(seconds[side], seconds["plain"]))
+        cpu = min(seconds[side]) / min(seconds["plain"])
         gains = [one.sum() / other.sum() / cpu for one, other in zip(plain, found, strict=True)]
         error = ratio_error(plain[0], found[0]) / cpu
         label, variance = f"`{side}`" if side else "default", found[0].sum() / plain[0].sum()
