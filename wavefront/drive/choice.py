@@ -111,18 +111,21 @@ def _ways(choice: Choice) -> int:
 
 def _chosen(settings: Settings, scene: CompiledScene, camera: Camera, asked: Choice, found: Run) -> Choice:
     """Return whether pixels share paths, or else how many branches these have, by what a run has found."""
-    light_is_rare = found.mean_variance() > RARE_LIGHT
-    asked = replace(asked, hint=GUIDE_HINT if light_is_rare and not asked.guided else None)
-    if _may_reuse(settings, camera) and _sharing_pays(scene, found, light_is_rare):
+    asked = replace(asked, hint=GUIDE_HINT if _light_is_rare(found) and not asked.guided else None)
+    if _may_reuse(settings, camera) and _sharing_pays(scene, found):
         return replace(asked, reuse=True)
     return _branched(settings, camera, found, asked)
 
 
-def _sharing_pays(scene: CompiledScene, found: Run, light_is_rare: bool) -> bool:
+def _light_is_rare(found: Run) -> bool:
+    return found.mean_variance() > RARE_LIGHT
+
+
+def _sharing_pays(scene: CompiledScene, found: Run) -> bool:
     """Return whether sharing paths pays: most of them can be shared, and these make the noise.
 
-    Mirrors, glass and narrow lobes at second points make bright spots, which no pixel can share. They are
-    most of the noise unless all light is hard to find; narrow lobes may be even then.
+    Narrow lobes at second points may make bright spots, which no pixel can share. So do mirrors and glass,
+    also those that the run has not met, unless all light is hard to find.
     """
     alone = ~(shared_materials(scene) | glossy_materials(scene))
     if not can_reuse(scene) or found.met[~alone].sum() < MOST_PATHS * found.paths:
@@ -130,16 +133,20 @@ def _sharing_pays(scene: CompiledScene, found: Run, light_is_rare: bool) -> bool
     if found.share_of_own() > OWN_LIGHT:
         return False
     wide = found.narrow <= NARROW_LOBES * found.paths
-    if light_is_rare:
-        return wide or found.share_of_outliers() < BRIGHT_SPOTS_OF_SHARED
-    return wide and not alone.any()
+    even = wide or found.share_of_outliers() < BRIGHT_SPOTS_OF_SHARED
+    return even and (_light_is_rare(found) or not alone.any())
 
 
 def _branched(settings: Settings, camera: Camera, found: Run, choice: Choice) -> Choice:
-    """Return a choice with branches if they pay; paths from sensors have no first ray to share."""
+    """Return a choice with branches if they pay.
+
+    Paths from sensors have no first ray to share. Where light is rare, and not shared, few bright paths make
+    the noise: branches meet more of those.
+    """
     if settings.values["branches"] != AUTO or choice.reuse or camera.sensor is not None:
         return choice
-    pays = found.cost(BRANCHES, found) < GAIN_OF_BRANCHES and found.share_of_outliers() < BRIGHT_SPOTS
+    even = not _light_is_rare(found) and found.share_of_outliers() < BRIGHT_SPOTS
+    pays = even and found.cost(BRANCHES, found) < GAIN_OF_BRANCHES
     return replace(choice, branches=BRANCHES) if pays else choice
 
 
