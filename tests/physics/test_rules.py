@@ -18,6 +18,7 @@ from wavefront.accel.numpy_accel import SMALL
 from wavefront.arrays.vec import luminance
 from wavefront.compile.scale import MAX_DISTANCE
 from wavefront.compile.scene import CompiledScene
+from wavefront.features.black_lights import BlackLights
 from wavefront.features.compiling import compile_scene
 from wavefront.lights import PatchedEnvironment, SkyPatches
 from wavefront.lights.image import LEAST_VARIANCE
@@ -251,7 +252,7 @@ def test_lights_that_scatter_hardly_anything(integrator: str, albedo: float) -> 
     """Paths end on black lights alone."""
     walls = box((-0.5,) * 3, (0.5,) * 3, wf.Diffuse(albedo), emission=1.0, inward=True)
     scene = wf.Scene([walls], camera=probe((0.5, 0.11, 0.07), (-0.2, 0.1, -0.3)))
-    assert (compiled(scene).nonscattering_lights is None) == (albedo > 0)
+    assert (compiled(scene).program.find(BlackLights) is None) == (albedo > 0)
     assert_mean(measure(scene, 16, integrator=integrator), 1 / (1 - albedo), 4e-5)
 
 

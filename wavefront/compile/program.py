@@ -32,6 +32,7 @@ class Facts:
     scene: Scene
     compiled: CompiledScene  # its arrays; its program is empty so far
     materials: Sequence[Material]  # all of the scene, by their numbers
+    nonscattering_lights: Bools | None  # (lights,) those whose surface is black; None when there are none
     has_alpha: Bools  # (m + k + 1,) primitives whose opacity is below 1
     asked: Mapping[str, Any]  # settings, by their names
     given: Sequence[Feature]  # of the user's own
@@ -87,6 +88,8 @@ class Feature:
         Its surfaces let a part of the light of shadow rays through.
     shading
         A subclass of `stages.shade.Shading` whose methods act where surfaces are shaded; None for none.
+    surfaces
+        A subclass of `stages.interaction.Surfaces` that changes what is known of hits; None for none.
     ways
         In how many ways each path goes on from its first surface.
     dimensions
@@ -116,6 +119,7 @@ class Feature:
     spares_opaque: ClassVar[bool] = False
     compared: ClassVar[bool] = True
     shading: ClassVar[Any] = None
+    surfaces: ClassVar[Any] = None
     ways: int = 1
     dimensions: ClassVar[range] = numbers_of(Dimension.FEATURE)
 
@@ -211,8 +215,8 @@ class Program:
     ----------
     begin, walk, cross, dim, tilt, weaken
         What acts at these points.
-    shading
-        What surfaces are when they are shaded, the outermost kind first.
+    shading, surfaces
+        What surfaces are when they are shaded, and when they are hit, the outermost kind first.
     see_through
         What shadow rays may pass.
     seen_through
@@ -232,7 +236,10 @@ class Program:
         self.begin, self.walk, self.cross, self.dim, self.tilt, self.weaken = (
             _at(self.features, point) for point in ("begin", "walk", "cross", "dim", "tilt", "weaken")
         )
-        self.shading = tuple(each.shading for each in reversed(self.features) if each.shading is not None)
+        self.shading, self.surfaces = (
+            tuple(getattr(each, name) for each in reversed(self.features) if getattr(each, name) is not None)
+            for name in ("shading", "surfaces")
+        )
         self.branches = math.prod(each.ways for each in self.features)
         self.see_through = self._later.see_through
         self.seen_through = tuple(each for each in self._camera.see_through if not each.drawn)

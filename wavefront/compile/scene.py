@@ -33,7 +33,7 @@ from .materials import (
     number_materials,
 )
 from .media import MediaTable, glow_lights, media_of, media_table, phase_materials
-from .morton import MortonGrid
+from .morton import AnyOrder, MortonGrid
 from .program import Facts, Program
 from .scale import check_distance, check_lights, length_factor, scaled_shapes
 from .shape_numbers import ShapeNumbers, number_shapes
@@ -71,10 +71,8 @@ class CompiledScene:
     lights: LightTable
     light_groups: LightGroups[str]
     light_efficacies: LightGroups[float]  # lm/W, for measurements
-    # (lights,) those whose surface scatters nothing; None when there are none
-    nonscattering_lights: Bools | None
     instances: InstanceTable | None = None  # None when no mesh is instanced
-    places: MortonGrid | None = None  # orders the paths of large scenes; None in small ones
+    places: MortonGrid | AnyOrder = AnyOrder()  # orders the paths of large scenes
     roulette_after: float = ROULETTE_AFTER  # scattering events before Russian roulette may end paths
     specular_surfaces: SpecularSurfaces | None = None  # for light tracing; None without it
     media: MediaTable | None = None  # None where none are, or each absorbs alone (absorption.py)
@@ -229,10 +227,11 @@ def gather_scene(
         lights=lights,
         light_groups=groups,
         light_efficacies=efficacies,
-        nonscattering_lights=nonscattering_lights,
         instances=table,
         specular_surfaces=specular,
         media=media,
-        places=MortonGrid.over((high - low) / 2) if len(triangles) >= LARGE else None,
+        places=MortonGrid.over((high - low) / 2) if len(triangles) >= LARGE else AnyOrder(),
     )
-    return Facts(scene, compiled, user_materials, has_alpha, asked, asked.get("features", ()), [])
+    return Facts(
+        scene, compiled, user_materials, nonscattering_lights, has_alpha, asked, asked.get("features", ()), []
+    )

@@ -33,7 +33,7 @@ class Caustics(Feature):
 
     compared = False  # the surfaces follow from the rest, and the setting is compared by itself
     shading = FirstSurfaces
-    surfaces: SpecularSurfaces
+    specular: SpecularSurfaces
 
     @classmethod
     def of(cls, facts: Facts) -> Self | None:
@@ -51,7 +51,7 @@ class Caustics(Feature):
         assert traced is not None
         lanes = emission.lanes
         found = take(traced, lanes) & take(leg.paths.specular, lanes)
-        found &= self.surfaces.includes(take(leg.left, lanes)) & (leg.hits.prim.take(lanes) >= 0)
+        found &= self.specular.includes(take(leg.left, lanes)) & (leg.hits.prim.take(lanes) >= 0)
         found &= leg.scene.lights.chosen_from.take(emission.light)
         if found.any():
             leg.emission = emission.take(np.flatnonzero(~found))

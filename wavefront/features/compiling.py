@@ -14,7 +14,11 @@ from ..scene import Scene
 from .absorption import Absorption
 from .alpha import Alpha
 from .background import Backdrop, Background
+from .black_lights import BlackLights
 from .caustics import Caustics
+from .dispersion import Dispersion
+from .instances import Instances
+from .interpolation import Interpolation, SmoothNormals
 from .media import Glow, Media
 from .nested import Nested
 from .normal_maps import NormalMaps
@@ -24,16 +28,21 @@ from .unseen import Unseen
 
 # In the order in which they act.
 FEATURES: tuple[type[Feature], ...] = (
+    Interpolation,
+    Instances,
+    SmoothNormals,
     Alpha,
     Nested,
     Unseen,
     ShadowCatchers,
     NormalMaps,
+    Dispersion,
     Absorption,
     Media,
     Passing,
     Glow,
     Caustics,
+    BlackLights,
     Backdrop,
     Background,
 )

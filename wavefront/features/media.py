@@ -16,6 +16,7 @@ from ..compile.scene import CompiledScene
 from ..sampling.sampler import Sampler
 from ..stages.accumulate import accumulate
 from ..stages.inside import stacks_at
+from ..stages.interaction import Surfaces
 from ..stages.intersect import ShadowRays
 from ..stages.medium import begin_in_media, cross, crossings, dim, fly
 from ..stages.shade import Shading
@@ -64,11 +65,35 @@ class ShadingInMedia(Shading):
             left.media = stacks_leaving(paths.media, self.crossing, cos_g)
 
 
+class SurfacesAndEvents(Surfaces):
+    """Surfaces that rays have hit, and places where media have scattered them.
+
+    There the normal is the direction that the light leaves in, and there is no primitive.
+    """
+
+    __slots__ = ()
+
+    def interaction(self) -> SurfaceInteraction:
+        """Return the geometry of both."""
+        rays, hits = self.rays, self.hits
+        self.hits = replace(hits, prim=np.maximum(hits.prim, 0))
+        surface = super().interaction()
+        lanes = np.flatnonzero(hits.prim < 0)
+        if lanes.size:
+            wo = take(surface.wo, lanes)
+            surface.point[:, lanes] = take(rays.origin, lanes) - wo * hits.t.take(lanes)
+            surface.error[lanes], surface.back_facing[lanes] = 0, False
+            surface.ng[:, lanes] = surface.ns[:, lanes] = wo
+            surface.prim[lanes], surface.material[lanes] = -1, self.material_rows(self.scene, hits, lanes)
+        return surface
+
+
 @soa
 class Media(Feature):
     """Scatters and weakens rays within media, and notes what they are inside of."""
 
     shading = ShadingInMedia
+    surfaces = SurfacesAndEvents
 
     @classmethod
     def of(cls, facts: Facts) -> Self | None:

@@ -23,7 +23,7 @@ def compact(scene: CompiledScene, paths: Paths, hits: Hits, lanes: Ints) -> tupl
     place, so that rays that start near each other are traced together. Fields of the paths that are needed
     only before the hit (`exclude_prim`, `pdf`, `prev_vertex`) are not kept.
     """
-    ordered, n = by_group(scene, hits, by_place(scene, paths, hits, lanes)), len(paths)
+    ordered, n = by_group(scene, hits, scene.places.ordered(paths, hits, lanes)), len(paths)
     if ordered is lanes and lanes.size == n:
         return paths, hits
     arrived = replace(
@@ -34,14 +34,6 @@ def compact(scene: CompiledScene, paths: Paths, hits: Hits, lanes: Ints) -> tupl
         left_receiver=None,
     )
     return arrived.take(ordered), hits.take(ordered)
-
-
-def by_place(scene: CompiledScene, paths: Paths, hits: Hits, lanes: Ints) -> Ints:
-    """Return lanes (k,) ordered by where they hit, on a Morton curve; the same array in small scenes."""
-    if scene.places is None:
-        return lanes
-    points = take(paths.origin, lanes) + take(paths.direction, lanes) * take(hits.t, lanes)
-    return lanes.take(np.argsort(scene.places.codes(points), kind="stable"))
 
 
 def by_group(scene: CompiledScene, hits: Hits, lanes: Ints) -> Ints:
@@ -62,12 +54,8 @@ def select(paths: Paths, lanes: Ints) -> Paths:
 
 
 def scattering_lanes(scene: CompiledScene, paths: Paths, hits: Hits, emission: Contribution) -> Ints:
-    """Return the lanes (k,) of paths that met a surface, unless it is a light that scatters nothing."""
-    if scene.nonscattering_lights is None:
-        return hits.met
-    found = hits.prim != -1
-    found[emission.lanes.compress(scene.nonscattering_lights.take(emission.light))] = False
-    return np.flatnonzero(found)
+    """Return the lanes (k,) of paths that have met a surface, or are scattered by a medium."""
+    return hits.met
 
 
 def specular_lanes(scene: CompiledScene, paths: Paths, hits: Hits, emission: Contribution) -> Ints:

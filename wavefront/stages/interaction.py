@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
+from functools import cache
 
 import numpy as np
 
-from ..arrays.state import Hits, Paths, Rays, SurfaceInteraction
+from ..accel import Intersections
+from ..arrays.state import Hits, Rays, SurfaceInteraction
 from ..arrays.vec import (
     ALL,
     Floats,
@@ -16,7 +17,6 @@ from ..arrays.vec import (
     f4,
     highest,
     interpolate,
-    length,
     normalize,
     signs,
     take,
@@ -31,79 +31,87 @@ MIN_COS = f4(1e-3)  # the least cosine between wo and the shading normal
 LIFT = f4(0.01)  # directions below the surface are raised to this cosine with `ng`
 
 
+class Surfaces:
+    """The surfaces that rays have hit. Features with a subclass of it change what they are about."""
+
+    __slots__ = ("hits", "instances", "rays", "scene")
+
+    def __init__(self, scene: CompiledScene, rays: Rays, hits: Hits) -> None:
+        self.scene, self.rays, self.hits = scene, rays, hits
+        self.instances: InstanceTable | None = None  # of the hits, where any are instances
+
+    @classmethod
+    def hits_of(cls, scene: CompiledScene, found: Intersections) -> Hits:
+        """Return the hits that an accelerator has found."""
+        return Hits(found.t, found.prim, None, None)
+
+    @classmethod
+    def material_rows(cls, scene: CompiledScene, hits: Hits, lanes: Lanes) -> Ints:
+        """Return the rows (k,) of the material table at some lanes of hits."""
+        return scene.material_of.take(take(hits.prim, lanes))
+
+    def interaction(self) -> SurfaceInteraction:
+        """Return their geometry."""
+        scene, rays, hits = self.scene, self.rays, self.hits
+        point = rays.origin + rays.direction * hits.t
+        error: Floats = POINT_ERROR * (highest(np.abs(point)) + hits.t)
+        wo = -rays.direction
+        ng, error = self.normals(point, error)
+        facing = dot(ng, wo)
+        side, back_facing = signs(facing), np.signbit(facing)
+        front = ng * side
+        ns = self.shading_normals(ng, front, side, point)
+        rows = self.material_rows(scene, hits, ALL)
+        surface = SurfaceInteraction(point, error, front, ns, wo, self.prims(), rows, back_facing)
+        for name, corners in scene.attributes.items():
+            values = _attribute(scene, name, corners, hits, point)
+            setattr(surface, name, self.vectors(values) if ATTRIBUTES[name].vectors else values)
+        return surface
+
+    def prims(self) -> Ints:
+        """Return primitive ids, (n,)."""
+        return self.hits.prim
+
+    def normals(self, point: Floats, error: Floats) -> tuple[Floats, Floats]:
+        """Return unit normals (3, n) of the front side, and error bounds (n,) of points (3, n).
+
+        Points of curved primitives are moved onto the surface in place.
+        """
+        return normals(self.scene, self.hits.prim, point, error), error
+
+    def shading_normals(self, ng: Floats, front: Floats, side: Floats, point: Floats) -> Floats:
+        """Return shading normals (3, n) on the side of wo.
+
+        Parameters
+        ----------
+        ng, front
+            Normals of the surface on its front side, and on the side of wo: times `side` (n,).
+        """
+        return front
+
+    def corner_normals(self, corners: list[Floats]) -> list[Floats]:
+        """Return normals of vertices, 3 × (3, n), in the coordinates of the scene."""
+        return corners
+
+    def vectors(self, values: Floats) -> Floats:
+        """Return vectors along the surfaces in the coordinates of the scene."""
+        return values
+
+
+@cache
+def surface_kind(parts: tuple[type[Surfaces], ...]) -> type[Surfaces]:
+    """Return surfaces that are all of these, the first outermost."""
+    return type("Surfaces", (*parts, Surfaces), {"__slots__": ()}) if parts else Surfaces
+
+
 def interaction(scene: CompiledScene, rays: Rays, hits: Hits) -> SurfaceInteraction:
-    """Return the surface geometry at hits; every ray must have hit a surface, or be scattered by a medium.
-
-    In a medium the normal is the direction that the light leaves in, and there is no primitive.
-    """
-    if scene.media is None:
-        return _on_surfaces(scene, rays, hits)
-    surface = _on_surfaces(scene, rays, replace(hits, prim=np.maximum(hits.prim, 0)))
-    lanes = np.flatnonzero(hits.prim < 0)
-    if lanes.size:
-        wo = take(surface.wo, lanes)
-        surface.point[:, lanes] = take(rays.origin, lanes) - wo * hits.t.take(lanes)
-        surface.error[lanes], surface.back_facing[lanes] = 0, False
-        surface.ng[:, lanes] = surface.ns[:, lanes] = wo
-        surface.prim[lanes], surface.material[lanes] = -1, material_rows(scene, hits, lanes)
-    return surface
-
-
-def _on_surfaces(scene: CompiledScene, rays: Rays, hits: Hits) -> SurfaceInteraction:
-    """Return the surface geometry at hits on surfaces."""
-    point = rays.origin + rays.direction * hits.t
-    instances = _instances_of(scene, hits)
-    error: Floats = POINT_ERROR * (highest(np.abs(point)) + hits.t)
-    wo = -rays.direction
-    ng = normals(scene, hits.prim, point, error)
-    if instances is not None:
-        ng, error = _normals_to_scene(instances, hits, ng, error)
-    ns = _shading_normals(scene, hits, instances, ng, point)
-    facing = dot(ng, wo)
-    side, back_facing = signs(facing), np.signbit(facing)
-    ng = ng * side
-    ns = ng if ns is None else face_viewer(wo, ns * side)
-    prim = hits.prim if instances is None else hits.prim + instances.shift
-    surface = SurfaceInteraction(point, error, ng, ns, wo, prim, material_rows(scene, hits, ALL), back_facing)
-    if scene.materials.dispersive and isinstance(rays, Paths):
-        surface.throughput = rays.throughput
-    for name, corners in scene.attributes.items():
-        values = _attribute(scene, name, corners, hits, point)
-        if instances is not None and ATTRIBUTES[name].vectors:
-            values = instances.vectors_to_scene(values)
-        setattr(surface, name, values)
-    return surface
-
-
-def _instances_of(scene: CompiledScene, hits: Hits) -> InstanceTable | None:
-    """Return the instance data of each hit; None in a scene without instances."""
-    if scene.instances is None or hits.instance is None:
-        return None
-    return scene.instances.take(hits.instance)
-
-
-def _normals_to_scene(
-    instances: InstanceTable, hits: Hits, ng: Floats, error: Floats
-) -> tuple[Floats, Floats]:
-    """Transform unit normals of meshes to the scene, and enlarge the errors (n,) of hit points.
-
-    The ray of an instance was rounded once more, in the mesh's coordinates: its direction, and its origin,
-    whose distance there is at most t and the mesh's radius together. Division by the length of the
-    transformed normal converts a length along the normal from these coordinates to the scene.
-    """
-    ng = instances.normals_to_scene(ng)
-    size = length(ng)
-    size = np.where(size > 0, size, f4(1))
-    return ng / size, error + POINT_ERROR * (instances.radius + hits.t) / size
+    """Return the surface geometry at hits; every ray must have hit a surface, or be scattered by a medium."""
+    return surface_kind(scene.program.surfaces)(scene, rays, hits).interaction()
 
 
 def material_rows(scene: CompiledScene, hits: Hits, lanes: Lanes) -> Ints:
     """Return the rows (k,) of the material table at some lanes of the hits."""
-    material = scene.material_of.take(take(hits.prim, lanes))
-    if scene.instances is None or scene.instances.material is None or hits.instance is None:
-        return material
-    replaced = scene.instances.material.take(take(hits.instance, lanes))
-    return np.where(replaced >= 0, replaced, material)
+    return surface_kind(scene.program.surfaces).material_rows(scene, hits, lanes)
 
 
 def normals(scene: CompiledScene, prim: Ints, point: Floats, error: Floats) -> Floats:
@@ -148,40 +156,10 @@ def face_viewer(wo: Floats, ns: Floats) -> Floats:
     return ns
 
 
-def _shading_normals(
-    scene: CompiledScene, hits: Hits, instances: InstanceTable | None, ng: Floats, point: Floats
-) -> Floats | None:
-    """Return the shading normals, (3, n); None where they are those of the surface in all of the scene."""
-    if not scene.shading_normals:
-        return None
-    ns = _interpolated_normals(scene, hits, instances, ng)
-    round_ = np.flatnonzero(hits.prim >= scene.triangles)
-    if scene.curved.shading_normals and round_.size:
-        prim = hits.prim.take(round_) - scene.triangles
-        ns[:, round_] = scene.curved.shading(prim, point.take(round_, 1), ng.take(round_, 1))
-    return ns
-
-
-def _interpolated_normals(
-    scene: CompiledScene, hits: Hits, instances: InstanceTable | None, ng: Floats
-) -> Floats:
-    """Return the interpolated vertex normals, (3, n), and `ng` where there are none."""
-    if scene.corner_normals is None:
-        return ng.copy()
-    corners = _at_corners(scene.corner_normals, hits, scene.triangles)
-    if instances is not None:
-        # Each is normalized, as in a mesh of its own: a skewed transform changes their lengths.
-        corners = [normalize(instances.normals_to_scene(corner)) for corner in corners]
-    ns = normalize(_interpolate(corners, hits))
-    flat = (hits.prim >= scene.triangles) | ~(dot(ns, ng) > 0)
-    np.copyto(ns, ng, where=flat)
-    return ns
-
-
 def _attribute(scene: CompiledScene, name: str, corners: Corners, hits: Hits, point: Floats) -> Floats:
     """Return an attribute at hits, (c, n): interpolated on triangles, computed on curved primitives."""
     if scene.triangles:
-        values = _interpolate(_at_corners(corners, hits, scene.triangles), hits)
+        values = interpolated(at_corners(corners, hits, scene.triangles), hits)
     else:
         values = np.empty((len(corners[0]), len(hits.prim)), f4)
     round_ = np.flatnonzero(hits.prim >= scene.triangles)
@@ -191,13 +169,13 @@ def _attribute(scene: CompiledScene, name: str, corners: Corners, hits: Hits, po
     return values
 
 
-def _at_corners(table: Corners, hits: Hits, triangles: int) -> list[Floats]:
+def at_corners(table: Corners, hits: Hits, triangles: int) -> list[Floats]:
     """Return the values at the corners of hit triangles, 3 × (c, n); those of any triangle for others."""
     prim = np.minimum(hits.prim, triangles - 1)
     return [corner.take(prim, 1) for corner in table]
 
 
-def _interpolate(corners: list[Floats], hits: Hits) -> Floats:
+def interpolated(corners: list[Floats], hits: Hits) -> Floats:
     a, b, c = corners
     assert hits.b1 is not None
     assert hits.b2 is not None

@@ -10,6 +10,7 @@ from ..arrays.vec import Bools, Floats, Ints, f4, positive, take
 from ..compile.scene import CompiledScene
 from ..lights import LightSample
 from ..sampling.steps import StepNumbers
+from .interaction import surface_kind
 
 TARGET_ERROR = f4(2**-20)  # rounding of a sampled point on a light, relative to its distance
 
@@ -28,12 +29,7 @@ class ShadowRays(Rays):
 def intersect(scene: CompiledScene, rays: Rays) -> Hits:
     """Return the nearest hit of each ray."""
     found = scene.accelerator.closest(rays.origin, rays.direction, rays.exclude_prim)
-    hits = Hits(found.t, found.prim, None, None)
-    if scene.interpolates:
-        hits.b1, hits.b2 = found.b1, found.b2
-    if scene.instances is not None:
-        hits.prim, hits.instance = scene.instances.locate(found.prim)
-    return hits
+    return surface_kind(scene.program.surfaces).hits_of(scene, found)
 
 
 def shadow_rays(surface: SurfaceInteraction, origin: Floats, light: LightSample, lanes: Ints) -> ShadowRays:

@@ -1,0 +1,87 @@
+"""Instances: meshes that are in a scene several times, and in its arrays once."""
+
+from __future__ import annotations
+
+from typing import Self
+
+import numpy as np
+
+from ..accel import Intersections
+from ..arrays.state import Hits, Rays
+from ..arrays.vec import Floats, Ints, Lanes, f4, length, normalize, take
+from ..compile.program import Facts, Feature
+from ..compile.scene import CompiledScene
+from ..stages.interaction import POINT_ERROR, Surfaces
+
+
+class InstancedSurfaces(Surfaces):
+    """Surfaces some of which are in the arrays in coordinates of their own."""
+
+    __slots__ = ()
+
+    def __init__(self, scene: CompiledScene, rays: Rays, hits: Hits) -> None:
+        super().__init__(scene, rays, hits)
+        assert scene.instances is not None
+        self.instances = None if hits.instance is None else scene.instances.take(hits.instance)
+
+    @classmethod
+    def hits_of(cls, scene: CompiledScene, found: Intersections) -> Hits:
+        """Return hits with the columns of their instances."""
+        hits = super().hits_of(scene, found)
+        assert scene.instances is not None
+        hits.prim, hits.instance = scene.instances.locate(found.prim)
+        return hits
+
+    @classmethod
+    def material_rows(cls, scene: CompiledScene, hits: Hits, lanes: Lanes) -> Ints:
+        """Return the rows (k,) of materials, of which instances may have their own."""
+        rows = super().material_rows(scene, hits, lanes)
+        assert scene.instances is not None
+        if scene.instances.material is None or hits.instance is None:
+            return rows
+        replaced = scene.instances.material.take(take(hits.instance, lanes))
+        return np.where(replaced >= 0, replaced, rows)
+
+    def prims(self) -> Ints:
+        """Return primitive ids, which tell instances apart."""
+        prim = super().prims()
+        return prim if self.instances is None else prim + self.instances.shift
+
+    def normals(self, point: Floats, error: Floats) -> tuple[Floats, Floats]:
+        """Transform unit normals of meshes to the scene, and enlarge the errors (n,) of hit points.
+
+        The ray of an instance was rounded once more, in the mesh's coordinates: its direction, and its origin,
+        whose distance there is at most t and the mesh's radius together. Division by the length of the
+        transformed normal converts a length along the normal from these coordinates to the scene.
+        """
+        ng, error = super().normals(point, error)
+        if self.instances is None:
+            return ng, error
+        ng = self.instances.normals_to_scene(ng)
+        size = length(ng)
+        size = np.where(size > 0, size, f4(1))
+        return ng / size, error + POINT_ERROR * (self.instances.radius + self.hits.t) / size
+
+    def corner_normals(self, corners: list[Floats]) -> list[Floats]:
+        """Transform normals of vertices, and normalize each as in a mesh of its own.
+
+        A skewed transform changes their lengths.
+        """
+        if self.instances is None:
+            return corners
+        return [normalize(self.instances.normals_to_scene(corner)) for corner in corners]
+
+    def vectors(self, values: Floats) -> Floats:
+        """Transform vectors along surfaces to the scene."""
+        return values if self.instances is None else self.instances.vectors_to_scene(values)
+
+
+class Instances(Feature):
+    """Places meshes in the scene that are stored once."""
+
+    surfaces = InstancedSurfaces
+
+    @classmethod
+    def of(cls, facts: Facts) -> Self | None:
+        """Return the feature of a scene with instances that share their arrays."""
+        return None if facts.compiled.instances is None else cls()
