@@ -265,7 +265,7 @@ class Program:
 
     def plus(self, *features: Feature) -> Program:
         """Return the program with more features, which act last."""
-        return Program([*self.features, *features])
+        return Program([*self.features, *features]) if features else self
 
     def of_sensors(self) -> Program:
         """Return the program of paths that start at sensors: these measure the light that is there."""

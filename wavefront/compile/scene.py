@@ -233,5 +233,12 @@ def gather_scene(
         places=MortonGrid.over((high - low) / 2) if len(triangles) >= LARGE else AnyOrder(),
     )
     return Facts(
-        scene, compiled, user_materials, nonscattering_lights, has_alpha, asked, asked.get("features", ()), []
+        scene=scene,
+        compiled=compiled,
+        materials=user_materials,
+        nonscattering_lights=nonscattering_lights,
+        has_alpha=has_alpha,
+        asked=asked,
+        given=asked.get("features", ()),
+        found=[],
     )

@@ -50,9 +50,9 @@ class InstancedSurfaces(Surfaces):
     def normals(self, point: Floats, error: Floats) -> tuple[Floats, Floats]:
         """Transform unit normals of meshes to the scene, and enlarge the errors (n,) of hit points.
 
-        The ray of an instance was rounded once more, in the mesh's coordinates: its direction, and its origin,
-        whose distance there is at most t and the mesh's radius together. Division by the length of the
-        transformed normal converts a length along the normal from these coordinates to the scene.
+        The ray of an instance was rounded once more, in the mesh's coordinates: its direction, and its
+        origin, whose distance there is at most t and the mesh's radius together. Division by the length of
+        the transformed normal converts a length along the normal from these coordinates to the scene.
         """
         ng, error = super().normals(point, error)
         if self.instances is None:

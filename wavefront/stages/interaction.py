@@ -176,6 +176,7 @@ def at_corners(table: Corners, hits: Hits, triangles: int) -> list[Floats]:
 
 
 def interpolated(corners: list[Floats], hits: Hits) -> Floats:
+    """Return values (c, n) on triangles, given those at their corners, 3 × (c, n)."""
     a, b, c = corners
     assert hits.b1 is not None
     assert hits.b2 is not None
