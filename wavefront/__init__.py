@@ -32,7 +32,7 @@ from .compile.program import Feature
 from .core.errors import Interrupted, RenderError, SaveError, SceneError
 from .core.html import register_preview
 from .core.suggestions import did_you_mean
-from .drive import Session
+from .drive import Session, program
 from .extensions import (
     register_accelerator,
     register_executor,
@@ -271,6 +271,7 @@ __all__ = [
     "measure",
     "measure_flux",
     "orbit",
+    "program",
     "register_accelerator",
     "register_executor",
     "register_filter",

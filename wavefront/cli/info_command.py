@@ -16,6 +16,7 @@ from ..codecs.luminaires import luminaire_texts, parsed_luminaire
 from ..core.errors import collect_warnings
 from ..core.parameter import brief
 from ..core.plural import plural
+from ..drive import program
 from ..io.load import load
 from ..lights.ies import Web
 from ..materials import Material
@@ -37,10 +38,15 @@ def add_info_command(commands: Any) -> None:
         commands,
         "info",
         "say what a file of a scene or luminaire holds: shapes, materials, lights, and what is wrong with it",
-        ["wavefront info scene.glb"],
+        ["wavefront info scene.glb", "wavefront info --stages scene.glb"],
     )
     command.add_argument("scene", help=SCENE_FILE)
     add_reading(command)
+    command.add_argument(
+        "--stages",
+        action="store_true",
+        help="list the stages that run for it, with their files",
+    )
     command.add_argument("--quiet", action="store_true", help="do not say that a large file is being read")
     command.set_defaults(run=_info)
 
@@ -48,6 +54,9 @@ def add_info_command(commands: Any) -> None:
 def _info(options: argparse.Namespace) -> int:
     """Say what a scene file holds; return the exit status."""
     path = options.scene
+    if options.stages:
+        print(program(load(path, progress=False, **reading(options)), progress=False))
+        return 0
     with collect_warnings() as said:  # they are listed here
         if path.lower().endswith(LUMINAIRES):
             lines, losses = [_luminaire(path)], list(said)

@@ -13,11 +13,13 @@ from ..camera import Camera
 from ..core.errors import SceneError
 from ..core.memory import check_memory, megabytes, resident_memory
 from ..core.plural import plural
+from ..features.view import seen_with
 from ..film.aov_names import LUX, aov_of
 from ..film.picture_sums import PictureSums, empty_sums
 from ..film.sums import bytes_per_pixel
 from ..guiding import GuideTable
-from ..integrators import INTEGRATORS
+from ..integrators import INTEGRATORS, WITH_MIS, li_reuse
+from ..integrators.stage_list import StageList, list_stages
 from ..sampling.filters import FILTERS
 from ..sampling.sampler import SAMPLERS
 from ..settings import Settings
@@ -136,6 +138,14 @@ class Plan:
     def sums(self, size: Sequence[int]) -> PictureSums:
         """Return the sums of no samples for a picture of a size (width, height)."""
         return empty_sums(size, self.tracer.recorded_aovs, self.settings.values["caustics"])
+
+    @property
+    def stages(self) -> StageList:
+        """The stages that run, and the features that act between them."""
+        tracer, choice = self.tracer, self.choice
+        view = seen_with(tracer.scene, tracer.table if choice.guided else None, choice.branches)
+        integrator = li_reuse if choice.reuse else tracer.integrator
+        return list_stages(integrator, view.program, mis=choice.reuse or integrator in WITH_MIS)
 
 
 def with_choice(plan: Plan, camera: Camera) -> Plan:

@@ -20,6 +20,7 @@ from ..core.shared import STOP, SharedInt
 from ..core.suggestions import suggests_keywords
 from ..film.picture_sums import PictureSums
 from ..image import Image
+from ..integrators.stage_list import StageList
 from ..io.to_scene import as_scene, choose_camera, coloring_of
 from ..settings import RenderSettings, Settings, describes_settings, takes_settings
 from ..workers.machine import reserve_buffers
@@ -399,6 +400,11 @@ class Session:
             The camera; None for that of the picture.
         """
         return silhouettes(self._scene.compiled, self._picture.camera if camera is None else camera)
+
+    @property
+    def stages(self) -> StageList:
+        """The stages that run, and the features that act between them, as `wf.program` lists them."""
+        return self._plan.stages
 
     def tell_hints(self, image: Image) -> None:
         """Write hints to stderr if the picture took over ten seconds: one line each, once in a session.
