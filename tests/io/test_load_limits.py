@@ -300,7 +300,7 @@ def test_where_memory_runs_out_the_file_and_its_size_are_named(
         ("wavefront.codecs.images.codes_to_linear", lambda: wf.Image.load(path), size),
         ("wavefront.codecs.raster._png", lambda: wf.Image.load(path), size),
         ("wavefront.lights.environment.ImageEnvironment.of", lambda: wf.Environment(path), size),
-        ("wavefront.io.load.place_shapes", lambda: wf.load(mesh), "a.obj: has 32 bytes"),
+        ("wavefront.io.description.contents.place_shapes", lambda: wf.load(mesh), "a.obj: has 32 bytes"),
         ("wavefront.io.obj.geometries", lambda: wf.load(mesh), "a.obj: has 32 bytes"),
     ):
         with monkeypatch.context() as patch:

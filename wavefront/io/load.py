@@ -6,7 +6,7 @@ import os
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Any
 
 from numpy.typing import ArrayLike
 
@@ -19,7 +19,7 @@ from ..materials import MaterialLike
 from ..scene import Scene
 from ..shapes import Instance, Mesh, Shape
 from ..shapes.smoothing import AUTO, check_smooth
-from .description.placing import place_meshes, place_shapes
+from .description.placing import place_meshes
 from .joining import join
 from .losses import Losses
 from .readers import LoadOptions, mesh_reader, read
@@ -27,7 +27,6 @@ from .sources import LoadLimits, PathLike, SceneFiles, checked_limits, folders
 from .trimesh import objects as trimesh_objects
 from .trimesh import view as trimesh_view
 
-T = TypeVar("T")
 ALL_OF_THE_LIGHT = (".xml", ".pbrt", ".xml.gz", ".pbrt.gz")  # scenes of renderers, which show no other light
 
 
@@ -92,18 +91,7 @@ def load(
             parameters=dict(parameters or {}),
             time=None if time is None else number("time", time),
         )
-        name, contents = path_name(path), read(path, options)
-        placed = place_shapes(name, contents.raws, contents.places, losses)
-        shapes = _some(losses, [*placed, *contents.shapes])
-        scene = Scene(
-            shapes,
-            contents.lights,
-            contents.camera,
-            up=contents.up,
-            settings=contents.settings,
-            medium=contents.medium,
-        )
-        scene.losses = losses.found
+        scene = read(path, options).scene(path_name(path), losses)
         if not os.fspath(path).lower().endswith(ALL_OF_THE_LIGHT):
             scene.lights_of_file = [id(each) for each in scene.lights]
         return scene
@@ -180,7 +168,10 @@ def load_meshes(
 def _meshes(path: PathLike, options: LoadOptions) -> list[Mesh]:
     name, contents = path_name(path), read(path, options)
     placed = place_meshes(name, contents.raws, contents.places, options.losses)
-    return _some(options.losses, [*placed, *(_as_mesh(name, shape) for shape in contents.shapes)])
+    meshes = [*placed, *(_as_mesh(name, shape) for shape in contents.shapes)]
+    if not meshes:
+        raise options.losses.nothing("has no faces")
+    return meshes
 
 
 def _as_mesh(name: str, shape: Shape) -> Mesh:
@@ -238,8 +229,8 @@ def from_trimesh(geometry: Any, *, smooth: bool | float | str = AUTO) -> Scene:
     with Losses(source) as losses:
         contents = trimesh_objects.read(geometry, source, losses)
         contents.smooth(check_smooth("smooth", smooth))
-        shapes = _some(losses, place_shapes(source, contents.raws, contents.places, losses))
-        scene = Scene(shapes, trimesh_view.lights(geometry, losses), up=contents.up)
+        scene = contents.scene(source, losses)
+        scene.lights = trimesh_view.lights(geometry, losses)
         trimesh_view.add_camera(scene, geometry)
         scene.losses = losses.found
         return scene
@@ -284,12 +275,4 @@ def from_mitsuba(
     name = "Mitsuba scene"
     with Losses(name, strict) as losses:
         files = SceneFiles(name, (), checked_limits(limits), losses)
-        made = convert(name, scene, files, Path, mesh_reader(files))
-        made.losses = losses.found
-        return made
-
-
-def _some(losses: Losses, shapes: list[T]) -> list[T]:
-    if not shapes:
-        raise losses.nothing("has no faces")
-    return shapes
+        return convert(name, scene, files, Path, mesh_reader(files)).scene(name, losses)

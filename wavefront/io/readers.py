@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 import re
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, TypeAlias
 
@@ -19,7 +19,6 @@ from .clouds import cloud
 from .dae import document as dae
 from .description.appearance import MaterialSpec, assign_material, from_srgb
 from .description.contents import Contents
-from .description.placing import Places
 from .gltf import scene as gltf
 from .gltf.materials import GltfMaterials
 from .losses import Losses
@@ -76,13 +75,12 @@ def _refuse(name: str, data: bytes) -> None:
 def _read_gltf(files: SceneFiles, data: bytes, options: LoadOptions) -> Contents:
     document = gltf.Document(files, data)
     with document.inside("the file"):
-        found = gltf.contents(document)
+        contents, numbers = gltf.contents(document)
         specs = GltfMaterials(document)
-        for raw, number in found.raws:
+        for raw, number in zip(contents.raws, numbers, strict=True):
             if options.materials and not assign_material(raw, specs.spec(number)):
                 document.lose("vertex colors", f"mesh {raw.name!r}")
-    raws = [raw for raw, _ in found.raws]
-    return Contents(raws, found.places, found.lights, found.camera, flat=True)
+    return contents
 
 
 def _read_obj(files: SceneFiles, data: bytes, options: LoadOptions) -> Contents:
@@ -93,7 +91,7 @@ def _read_obj(files: SceneFiles, data: bytes, options: LoadOptions) -> Contents:
     if parsed.points is not None:
         codes = None if parsed.points.shape[1] < 6 else from_srgb(parsed.points[:, 3:])
         points = cloud(losses, parsed.points[:, :3], codes)
-        return Contents([], Places.once(0), shapes=[] if points is None else [points])
+        return Contents(shapes=[] if points is None else [points])
     specs = _libraries(files, parsed.libraries) if materials else {}
     for raw in parsed.raws:
         raw.colors = None if raw.colors is None else from_srgb(raw.colors)
@@ -164,11 +162,8 @@ def _read_mitsuba(files: SceneFiles, data: bytes, options: LoadOptions) -> Conte
     from .mitsuba.convert import convert  # here, as programs that read no such scene need not pay for it
     from .mitsuba.document import Document
 
-    name = files.name
     document = Document(files, data, options.parameters)
-    return _contents(
-        convert(name, document.scene, files, document.find, mesh_reader(files), document.version)
-    )
+    return convert(files.name, document.scene, files, document.find, mesh_reader(files), document.version)
 
 
 def _read_usd(files: SceneFiles, data: bytes, options: LoadOptions) -> Contents:
@@ -177,18 +172,10 @@ def _read_usd(files: SceneFiles, data: bytes, options: LoadOptions) -> Contents:
     return read_usd(files, options.time)
 
 
-PARTS = ("lights", "camera", "shapes", "settings", "medium")  # of a scene, that contents have, too
-
-
 def _read_pbrt(files: SceneFiles, data: bytes, options: LoadOptions) -> Contents:
     from .pbrt.scene import read_scene  # here, as programs that read no such scene need not pay for it
 
-    return _contents(read_scene(files, data, mesh_reader(files)))
-
-
-def _contents(scene: Scene) -> Contents:
-    """Return a scene as the contents of a file."""
-    return replace(Contents.once([]), **{name: getattr(scene, name) for name in PARTS})
+    return read_scene(files, data, mesh_reader(files))
 
 
 def mesh_reader(files: SceneFiles) -> Callable[[Path], list[RawMesh]]:
@@ -222,7 +209,7 @@ def _from_scene(load: Callable[[str, bytes], Scene]) -> Reader:
         scene = load(name, data)
         if not isinstance(scene, Scene):
             raise SceneError(f"{name}: its reader returned {type(scene).__name__}; it must return a wf.Scene")
-        return Contents([], Places.once(0), scene.lights, scene.camera, scene.shapes)
+        return Contents(lights=scene.lights, camera=scene.camera, shapes=scene.shapes)
 
     return read_scene
 

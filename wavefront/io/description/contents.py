@@ -1,4 +1,4 @@
-"""The content of a file or a trimesh object, whatever its format."""
+"""What a file or an object of another library holds: the one thing that every importer fills."""
 
 from __future__ import annotations
 
@@ -9,18 +9,20 @@ from typing import Any
 from ...camera import Camera
 from ...lights import Light
 from ...media import BaseMedium
+from ...scene import Scene
 from ...shapes import Instance, Mesh, Shape
 from ...shapes.smoothing import AUTO
+from ..losses import Losses
 from ..repair import RawMesh
-from .placing import Places
+from .placing import Places, place_shapes
 
 
 @dataclass
 class Contents:
-    """The content of a file."""
+    """The content of a file at one time, with lengths and axes of the scene."""
 
-    raws: list[RawMesh]
-    places: Places
+    raws: list[RawMesh] = field(default_factory=list)  # each once, with its material and its light
+    places: Places = field(default_factory=Places)  # of these; samples of more times belong beside it
     lights: Sequence[Light] = ()
     camera: Camera | None = None
     shapes: Sequence[Shape] = ()  # further ones, built already
@@ -33,6 +35,22 @@ class Contents:
     def once(cls, raws: list[RawMesh]) -> Contents:
         """Return meshes that are placed once each, without a transform."""
         return cls(raws, Places.once(len(raws)))
+
+    def scene(self, name: str, losses: Losses) -> Scene:
+        """Return the scene.
+
+        Raises
+        ------
+        SceneError
+            If it has nothing that can be seen, or as from `place_shapes`.
+        """
+        shapes = [*place_shapes(name, self.raws, self.places, losses), *self.shapes]
+        if not shapes:
+            raise losses.nothing("has no faces")
+        seen = {"up": self.up, "settings": self.settings, "medium": self.medium}
+        scene = Scene(shapes, self.lights, self.camera, **seen)  # type: ignore[arg-type]
+        scene.losses = losses.found
+        return scene
 
     def smooth(self, smooth: bool | float | str) -> None:
         """Say what normals the meshes get, as for `load`: "auto" keeps those of the file."""

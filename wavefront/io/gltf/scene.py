@@ -6,15 +6,14 @@ from the JSON itself, so numbers are exact, and every index is checked.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
 
 from ...camera import Camera
 from ...core.errors import LimitError, SceneError, exact, printable
-from ...lights import DirectionalLight, PointLight, SpotLight
 from ...shapes.transform import IDENTITY, Matrix
+from ..description.contents import Contents
 from ..description.numbers import floats, shown
 from ..description.placing import Places
 from ..description.punctual import punctual_light
@@ -28,30 +27,15 @@ from .posing import Skin, held, pose, read_skin, target_weights
 HEIGHT = 512  # pixels of a camera's picture; files give only its aspect ratio
 
 
-@dataclass
-class GltfContents:
-    """The content of a file."""
-
-    raws: list[tuple[RawMesh, Any]] = field(default_factory=list)  # meshes, numbers of their materials
-    places: Places = field(default_factory=Places)  # of the meshes
-    lights: list[DirectionalLight | PointLight | SpotLight] = field(default_factory=list)
-    camera: Camera | None = None
-
-
-def contents(document: Document) -> GltfContents:
-    """Read the default scene.
-
-    Parameters
-    ----------
-    document
-        The file.
+def contents(document: Document) -> tuple[Contents, list[Any]]:
+    """Return what the default scene holds, and the number of each mesh's material; None for none.
 
     Raises
     ------
     SceneError
         If an element is missing or malformed, or the nodes place more meshes than its limits allow.
     """
-    out, nodes = GltfContents(), walk(document)
+    out, nodes = Contents(flat=True), walk(document)
     meshes = _Meshes(document, {node.index: node.matrix for node in nodes})
     for node in nodes:
         if not node.shown:
@@ -65,8 +49,8 @@ def contents(document: Document) -> GltfContents:
         document.lose("further scenes", "the file")
     if document.json.get("animations"):
         document.files.losses.note("animations", done="left out; what they move is at rest")
-    out.raws, out.places = meshes.raws, meshes.places()
-    return out
+    out.raws, out.places = [raw for raw, _ in meshes.raws], meshes.places()
+    return out, [number for _, number in meshes.raws]
 
 
 class _Meshes:
@@ -183,7 +167,7 @@ def _names_of_parts(node: Node, parts: int) -> list[str]:
     return [f"{name}_{part}" if name and parts > 1 else name for part in range(parts)]
 
 
-def _add_others(document: Document, out: GltfContents, node: Node) -> None:
+def _add_others(document: Document, out: Contents, node: Node) -> None:
     """Add the camera and the light of a node."""
     if "camera" in node.json:
         with document.part(f"nodes[{node.index}].camera"):
@@ -194,7 +178,7 @@ def _add_others(document: Document, out: GltfContents, node: Node) -> None:
             _add_light(document, out, light, node.matrix)
 
 
-def _add_camera(document: Document, out: GltfContents, index: Any, matrix: Matrix) -> None:
+def _add_camera(document: Document, out: Contents, index: Any, matrix: Matrix) -> None:
     if out.camera is not None:
         document.lose("further cameras", f"cameras[{shown(index)}]")
         return
@@ -228,7 +212,7 @@ def _positive(lens: dict[str, Any], key: str, default: float | None) -> float:
     return value
 
 
-def _add_light(document: Document, out: GltfContents, index: Any, matrix: Matrix) -> None:
+def _add_light(document: Document, out: Contents, index: Any, matrix: Matrix) -> None:
     """Add a light of KHR_lights_punctual; candela count as W/sr, of 1 lm/W."""
     lights = document.json.get("extensions", {}).get("KHR_lights_punctual", {}).get("lights", [])
     if not isinstance(index, int) or not 0 <= index < len(lights):
@@ -242,4 +226,4 @@ def _add_light(document: Document, out: GltfContents, index: Any, matrix: Matrix
             document.lose(f"{light.get('type')} light", f"light {index}")
         else:
             found.efficacy = OF_CANDELA
-            out.lights.append(found)
+            out.lights = [*out.lights, found]

@@ -9,6 +9,7 @@ from typing import Any
 from ...camera import Sensors, SurfaceSensors
 from ...lights import Environment, Sky
 from ...scene import Scene
+from ..description.contents import Contents
 from ..description.conversion import only_one, shown
 from ..description.entity import Entity
 from ..repair import RawMesh
@@ -26,8 +27,8 @@ def convert(
     find: Callable[[str], Path],
     read_mesh: Callable[[Path], list[RawMesh]],
     version: str = "",
-) -> Scene:
-    """Return the scene of a dictionary.
+) -> Contents:
+    """Return what a dictionary holds.
 
     Parameters
     ----------
@@ -51,7 +52,7 @@ def convert(
     """
     job = Job(name, files, find, read_mesh)
     job.instead["film"] = DEFAULT_FILM, "the default in its place"
-    made: Scene = job.convert(Graph(name, job, version).build(scene))
+    made: Contents = job.convert(Graph(name, job, version).build(scene))
     return made
 
 
@@ -59,28 +60,29 @@ DEFINED = "bsdf texture sampler film rfilter medium phase volume"  # for others 
 
 
 @plugin("scene", "scene", "", f"shape emitter sensor integrator {DEFINED}", "allow_thread_reordering")
-def _scene(entity: Entity) -> Scene:
+def _scene(entity: Entity) -> Contents:
+    job = entity.job
     parts = [part for part in entity.held("shape") if part.type != "shapegroup"]
     carried = [(sensor, part) for part in parts for sensor in part.held("sensor")]
     sensors = [(sensor, entity) for sensor in entity.held("sensor")] + carried
-    seen = [(*each, view) for each in sensors if (view := entity.job.convert(each[0])) is not None]
+    seen = [(*each, view) for each in sensors if (view := job.convert(each[0])) is not None]
     for sensor, *_ in seen[1:]:
         entity.lose(f"the further sensor {sensor.type!r}")
     camera, settings = seen[0][2] if seen else (None, {})
-    entity.job.eye = None if camera is None else camera.origin
+    job.eye = None if camera is None else camera.origin
     integrators = entity.held("integrator")
-    entity.job.sees_media = not integrators or sees_media(integrators[0])
-    followed = entity.job.convert(integrators[0]) if integrators else {}
+    job.sees_media = not integrators or sees_media(integrators[0])
+    followed = job.convert(integrators[0]) if integrators else {}
     measures, hides = bool(seen) and (camera is None or isinstance(camera, Sensors)), "background" in followed
-    entity.job.hides_lamps = hides and not measures
+    job.hides_lamps = hides and not measures
     if hides and measures:
         entity.lose("hide_emitters for a sensor that measures light")
-    found = [shape for part in parts for shape in entity.job.convert(part)]
+    found = [shape for part in parts for shape in job.convert(part)]
     lamps = [part for part in entity.held("emitter") if part.type != "area"]
-    made = [light for part in lamps if (light := entity.job.convert(part)) is not None]
+    made = [light for part in lamps if (light := job.convert(part)) is not None]
     lights = [light for each in made for light in (each if isinstance(each, list) else [each])]
-    lights = only_one(lights, entity.job.files.losses)
-    found = shown(found, lights, entity.job.files.losses)
+    lights = only_one(lights, job.files.losses)
+    found = shown(found, lights, job.files.losses)
     settings = settings | followed
     if measures or (not hides and any(isinstance(light, Environment | Sky) for light in lights)):
         settings.pop("background", None)  # alpha is 1
@@ -88,16 +90,10 @@ def _scene(entity: Entity) -> Scene:
         camera = _meter(*seen[0][:2])
     elif seen and not measures:
         check_clipping(seen[0][0], camera, found)
-    scene = Scene(
-        found,
-        lights,
-        camera,
-        settings=settings,
-        medium=medium_around(entity, seen[0][0] if seen else None),
-    )
-    if isinstance(camera, Sensors) and found:
-        scene.camera = camera.above(scene.bounds)
-    return scene
+    if isinstance(camera, Sensors):
+        camera = camera.above(Scene(found).bounds)
+    medium = medium_around(entity, seen[0][0] if seen else None)
+    return Contents(lights=lights, camera=camera, shapes=found, settings=settings, medium=medium)
 
 
 def _meter(sensor: Entity, place: Entity) -> SurfaceSensors | None:

@@ -13,8 +13,8 @@ import numpy as np
 from ...arrays.vec import Doubles
 from ...core.errors import SceneError
 from ...sampling.filters import GaussianFilter
-from ...scene import Scene
 from ...shapes.transform import Matrix, rotation, translation
+from ..description.contents import Contents
 from ..description.conversion import placed, shown
 from ..description.entity import Entity
 from ..description.views import looking
@@ -91,8 +91,8 @@ class Reader:
         else:
             getattr(self, f"_{name}")(statement)
 
-    def finish(self) -> Scene:
-        """Return the scene."""
+    def finish(self) -> Contents:
+        """Return what the file holds."""
         job = self.job
         for name, where, _ in self.stack:
             job.files.losses.note(f"{name} has no end", where, done="it ends with the file")
@@ -116,7 +116,8 @@ class Reader:
         lamps = [light for entity in self.lights if (light := job.convert(entity)) is not None]
         lamps = lights.summed(lamps, job.files.losses)
         view = None if camera is None else job.convert(camera)
-        return Scene(shown(found, lamps, job.files.losses), lamps, view, settings=settings, medium=job.around)
+        found = shown(found, lamps, job.files.losses)
+        return Contents(lights=lamps, camera=view, shapes=found, settings=settings, medium=job.around)
 
     def _entity(
         self, kind: str, statement: Statement, target: str, type: str, name: str = "", variant: str = ""
@@ -294,8 +295,8 @@ class Reader:
         self.uses.setdefault(name, []).append(self.state.matrices[0])
 
 
-def read_scene(files: SceneFiles, data: bytes, read_mesh: Callable[[Path], list[RawMesh]]) -> Scene:
-    """Return the scene of a file.
+def read_scene(files: SceneFiles, data: bytes, read_mesh: Callable[[Path], list[RawMesh]]) -> Contents:
+    """Return what a file holds.
 
     Parameters
     ----------

@@ -17,7 +17,6 @@ from .. import mtl
 from ..clouds import cloud
 from ..description.appearance import MaterialSpec, assign_material, from_srgb, is_faint
 from ..description.contents import Contents
-from ..description.placing import Places
 from ..losses import Losses
 from ..polygons import fans_by_size, triangulate
 from ..repair import RawMesh, Table, with_corners_apart
@@ -68,7 +67,7 @@ def parse(files: SceneFiles, data: bytes, materials: bool) -> Parsed:
     if not any(each.count for each in header.elements if each.name in ("face", "tristrips")):
         found = cloud(files.losses, points, _codes(vertex))
         shapes = [] if found is None else [found]
-        return Parsed(Contents([], Places.once(0), shapes=shapes), rows, NONE.row)
+        return Parsed(Contents(shapes=shapes), rows, NONE.row)
     points[bad_rows(vertex)] = np.nan
     faces = _faces(files, rows, points)
     raw = RawMesh(NAME, points, faces.triangles, normals=vertex.table(("nx", "ny", "nz")))
