@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from .codecs.display import Display
 from .codecs.images import check_writable
+from .codecs.tone import AUTO
 from .codecs.white_balance import WhiteBalance
 from .core.errors import SaveError, SceneError, number
 from .core.files import check_target, extension_of, path_name, write_bytes
@@ -30,7 +31,7 @@ def save_animation(
     fps: float = 24,
     gamma: float | str = 2.2,
     exposure: float = 0.0,
-    tone: str = "none",
+    tone: str = AUTO,
     white_balance: WhiteBalance | None = None,
 ) -> int:
     """Save images as an animation, or as numbered files.

@@ -90,30 +90,63 @@ def test_three_sides_of_a_cube_can_be_told_apart_and_from_the_background() -> No
     assert np.ptp([even[rows, columns].mean() for rows, columns in CUBE_PARTS[:3]]) < 0.02
 
 
-@pytest.mark.parametrize("albedo", [0.02, 0.5, 0.8])
+def lightness(codes: np.ndarray) -> np.ndarray:
+    """L* of sRGB codes."""
+    color = codes / 255
+    linear = np.where(color <= 0.04045, color / 12.92, ((color + 0.055) / 1.055) ** 2.4)
+    y = linear @ np.array([0.2126, 0.7152, 0.0722])
+    return np.where(y > 0.008856, 116 * np.cbrt(y) - 16, 903.3 * y)
+
+
+def across_the_edge(values: np.ndarray, inside: np.ndarray) -> np.ndarray:
+    """Differences between both sides of a silhouette, three pixels apart in rows and columns."""
+    found = []
+    for grid, mask in ((values, inside), (values.T, inside.T)):
+        a, b, c, d = (mask[:, k : mask.shape[1] - 3 + k] for k in range(4))
+        edge = (a & b & ~c & ~d) | (~a & ~b & c & d)
+        found.append(np.abs(grid[:, :-3] - grid[:, 3:])[edge])
+    return np.concatenate(found)
+
+
+@pytest.mark.parametrize("albedo", [0.03, 0.2, 0.5, 0.9])
 def test_dark_and_white_things_stand_out(albedo: float) -> None:
-    """All around, by the least of their brightness and that of the background behind."""
-    scene = ball(wf.Diffuse(albedo))
-    picture = render(scene).mean(2)
-    height, width = picture.shape
-    y, x = np.mgrid[:height, :width]
-    distance = np.hypot(y - (height - 1) / 2, x - (width - 1) / 2)
-    back_facing, outside = (
-        picture[(distance > 9) & (distance < 11.5)],
-        picture[(distance > 14) & (distance < 17)],
-    )
-    assert (
-        (back_facing < 0.6 * outside.min()).all()
-        if albedo < 0.1
-        else np.median(back_facing) > 1.7 * outside.max()
-    )
-    assert picture.max() < 1
+    """All around, by their lightness beside that of what is behind them; and white is not cut off."""
+    ball = wf.Sphere((0, 0, 0), 1, material=wf.Diffuse(albedo))
+    image = wf.render(ball, 8, size=(64, 64), aovs="shape_id", workers=1, progress=False)
+    codes = image.to_uint8()
+    steps = across_the_edge(lightness(codes), image.layers["shape_id"] == 0)
+    assert len(steps) > 100
+    assert steps.mean() > 15
+    assert np.median(steps) > 15
+    assert codes.max() < 250
+
+
+def test_the_tone_is_chosen_with_the_light() -> None:
+    """Shown by AgX, a stop brighter, also from a file; light of one's own is shown as it is."""
+    chosen, own = wf.render(cube(), **CHOSEN), wf.render([cube(), wf.Environment(1)], **CHOSEN)
+    assert (chosen.metadata["tone"], own.metadata["tone"]) == ("agx", "none")
+    by_hand = wf.Image(2 * chosen.rgb).to_uint8(tone="agx")
+    for tone in ("auto", "agx"):
+        np.testing.assert_array_equal(chosen.to_uint8(tone=tone), by_hand)
+    np.testing.assert_array_equal(chosen.to_uint8(), by_hand)
+    assert (chosen.to_uint8(tone="none") != by_hand).any()
+    np.testing.assert_array_equal(own.to_uint8(), own.to_uint8(tone="none"))
+    np.testing.assert_array_equal(own.to_uint8(tone="agx"), wf.Image(own.rgb).to_uint8(tone="agx"))
+    named = wf.render(cube(), lighting="studio", **CHOSEN)
+    np.testing.assert_array_equal(named.to_uint8(), named.to_uint8(tone="none"))
+
+
+def test_the_tone_is_kept_in_files(tmp_path) -> None:
+    chosen = wf.render(cube(), **CHOSEN)
+    chosen.save(tmp_path / "a.exr")
+    read = wf.Image.load(tmp_path / "a.exr")
+    np.testing.assert_array_equal(read.to_uint8(), chosen.to_uint8())
 
 
 @pytest.mark.filterwarnings("error")
 def test_no_light_is_no_reason_to_warn() -> None:
     image = wf.render(ball(), 1, progress=False)
-    assert (image.metadata["lighting"], image.metadata["ground"]) == ("studio", False)
+    assert (image.metadata["lighting"], image.metadata["ground"]) == ("studio", True)
 
 
 @pytest.mark.filterwarnings("error")
@@ -325,11 +358,13 @@ CHOSEN = {"spp": 1, "size": (8, 8), "progress": False}
         ({"lighting": "studio", "ground": True}, True),
         ({"background": "transparent"}, False),
         ({"background": (1, 1, 1), "ground": True}, True),
-        ({"camera": wf.Camera.look_at((0, 1, 5), (0, 0, 0))}, False),
+        ({"camera": wf.Camera.look_at((0, 1, 5), (0, 0, 0))}, True),
+        ({"camera": wf.Camera.look_at((0, -0.5, 5), (0, 0, 0))}, True),
+        ({"camera": wf.Camera.look_at((0, -2, 5), (0, 0, 0))}, False),
     ],
 )
-def test_the_ground_is_there_where_everything_is_chosen(settings, there) -> None:
-    """Where nobody chose a light or a camera, it would hide nothing, and no background is wanted."""
+def test_the_ground_is_there_where_the_light_is_chosen(settings, there) -> None:
+    """Where nobody chose a light, it would hide nothing, and no background is wanted."""
     image = wf.render(cube(), **CHOSEN, **settings)
     assert image.metadata["ground"] is there
     same = wf.render(cube(), **CHOSEN, **{**settings, "ground": there})
@@ -338,10 +373,10 @@ def test_the_ground_is_there_where_everything_is_chosen(settings, there) -> None
     assert ("ground" in other.names["shape"].values()) is not there
 
 
-def test_scenes_with_a_light_or_a_camera_get_no_ground() -> None:
+def test_scenes_with_a_light_get_no_ground() -> None:
     lit = wf.Scene([cube()], [wf.Environment(1)])
     assert wf.render(lit, **CHOSEN).metadata["ground"] is False
-    assert wf.render(ball(), **CHOSEN).metadata["ground"] is False
+    assert wf.render(ball(), **CHOSEN).metadata["ground"] is True
     with pytest.raises(
         wf.SceneError, match="ground is 'yes'; it must be True or False, or 'shadow', or 'auto'"
     ):

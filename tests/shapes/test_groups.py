@@ -52,7 +52,9 @@ def test_a_group_is_what_its_placed_shapes_are(shared_instances: None) -> None:
     group = wf.Group(parts()).placed(matrix)
     camera = wf.Camera.look_at((1, 1, 8), (0.5, 0, 0), fov=40, size=(24, 24))
     pictures = [
-        wf.render(wf.Scene(shapes, camera=camera), 2, aovs=("shape_id", "position"), progress=False)
+        wf.render(
+            wf.Scene(shapes, camera=camera), 2, ground=False, aovs=("shape_id", "position"), progress=False
+        )
         for shapes in (one_by_one, [group], group)
     ]
     for picture in pictures[1:]:

@@ -17,7 +17,7 @@ from ..camera import image_size, upward
 from ..codecs.display import Display
 from ..codecs.encoding import check_exposure, check_gamma
 from ..codecs.image_data import TRANSPARENT
-from ..codecs.tone import TONES
+from ..codecs.tone import TONE_NAMES
 from ..colors import rgb
 from ..core.errors import SceneError
 from ..core.progress import Progress
@@ -298,7 +298,7 @@ def add_display(command: argparse.ArgumentParser) -> None:
     """Add the options of display."""
     command.add_argument("--gamma", type=gamma, default=2.2, help='for png and jpg: a number or "srgb"')
     command.add_argument("--exposure", type=exposure, default=0.0, help="stops, applied when saving")
-    command.add_argument("--tone", choices=TONES, default="none", help="tone curve, for png and jpg")
+    command.add_argument("--tone", choices=TONE_NAMES, default="auto", help="tone curve, for png and jpg")
     command.add_argument(
         "--white-balance",
         type=white_balance,

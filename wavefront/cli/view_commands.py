@@ -8,7 +8,7 @@ from typing import Any
 from ..animation import check_animation, save_animation
 from ..camera import Camera
 from ..codecs.display import Display
-from ..codecs.tone import TONES
+from ..codecs.tone import TONE_NAMES
 from ..core.plural import plural
 from ..core.progress import Progress
 from ..datasets import write_dataset
@@ -163,7 +163,9 @@ def add_view_command(commands: Any) -> None:
         help="what the page's address has as ?token=; others see it here (default: drawn)",
     )
     token.add_argument("--no-token", dest="token", action="store_false", help="let in all who can connect")
-    command.add_argument("--tone", choices=TONES, default="none", help="tone curve that the page begins with")
+    command.add_argument(
+        "--tone", choices=TONE_NAMES, default="auto", help="tone curve that the page begins with"
+    )
     command.add_argument("--no-browser", action="store_true", help="do not open the page")
     add_settings(command)
     command.set_defaults(run=_view)

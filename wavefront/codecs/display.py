@@ -13,7 +13,7 @@ from ..core.errors import one_of
 from .encoding import check_exposure, check_gamma, exposed, to_codes
 from .image_data import ImageData
 from .png_jpeg import Gamma
-from .tone import TONES, transformed
+from .tone import AUTO, CHOSEN_STOPS, CHOSEN_TONE, TONES, transformed
 from .white_balance import WhiteBalance, white_balance_matrix
 
 
@@ -29,14 +29,15 @@ class Display:
 
     gamma: Gamma = 2.2  # values are raised to 1/gamma; "srgb" is the exact sRGB curve
     exposure: float = 0.0  # stops by which the picture is brightened first
-    tone: str = "none"  # a name of `TONES`
+    tone: str = AUTO  # a name of `TONES`, or what the metadata of the picture say
     white_balance: WhiteBalance | None = None  # kelvin, or the linear RGB of something gray
 
     def __post_init__(self) -> None:
         """Check all values."""
         check_gamma(self.gamma)
         check_exposure(self.exposure)
-        one_of("tone", self.tone, TONES)
+        if self.tone != AUTO:
+            one_of("tone", self.tone, TONES)
         if self.white_balance is not None:
             white_balance_matrix(self.white_balance)
 
@@ -62,12 +63,20 @@ class Display:
         """
         alpha = picture.alpha
         color = picture.rgb if alpha is None else _unassociated(picture.rgb, alpha)
-        curve = TONES[self.tone]
-        shown = color if curve is None else curve(color.astype(np.float64))
+        shown = self._toned(color, picture.metadata.get("tone") == CHOSEN_TONE)
         codes = to_codes(shown, self.gamma, bits)
         if alpha is None:
             return codes
         return np.concatenate([codes, to_codes(alpha[..., None], 1, bits)], axis=-1)
+
+    def _toned(self, color: Floats, chosen: bool) -> NDArray[Any]:
+        """Return colors after the tone curve; `chosen` if the light of the picture was chosen for one."""
+        tone = self.tone if self.tone != AUTO else CHOSEN_TONE if chosen else "none"
+        curve = TONES[tone]
+        if curve is None:
+            return color
+        stops = CHOSEN_STOPS if chosen and tone == CHOSEN_TONE else 0.0
+        return curve(color.astype(np.float64) * 2.0**stops)
 
 
 def _unassociated(rgb: Floats, alpha: Floats) -> Floats:

@@ -29,6 +29,7 @@ from .budget import Budget, in_memory
 from .display import Display
 from .encoding import codes_to_linear
 from .image_data import TRANSPARENT, ImageData
+from .tone import AUTO
 
 T = TypeVar("T")
 SIGNATURE_BYTES = 16
@@ -62,7 +63,7 @@ def check_display(path: str | os.PathLike[str], display: Display, bits: int = 8)
         If the format is for linear values and there is a tone curve, or it has no codes of 16 bits.
     """
     extension = Path(path).suffix.lower()
-    if display.tone != "none" and extension not in coded.EXTENSIONS:
+    if display.tone not in (AUTO, "none") and extension not in coded.EXTENSIONS:
         names = ", ".join(coded.EXTENSIONS)
         raise SaveError(f"{path}: tone={display.tone!r} is for {names}; {extension} holds linear values")
     if bits not in (8, 16):

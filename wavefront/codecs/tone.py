@@ -80,9 +80,14 @@ def _limited(rgb: Doubles) -> Doubles:
     return np.clip(np.nan_to_num(rgb, nan=0.0, posinf=LARGEST), 0, LARGEST)
 
 
+AUTO = "auto"  # what the metadata of a picture say
+CHOSEN_TONE = "agx"  # of pictures whose light was chosen automatically
+CHOSEN_STOPS = 1.0  # by which their light is brightened before this curve, which leaves room above white
+
 TONES: dict[str, Callable[[Doubles], Doubles] | None] = {  # by name; None leaves the values as they are
     "none": None,
     "reinhard": reinhard,
     "aces": aces,
     "agx": agx,
 }
+TONE_NAMES = (AUTO, *TONES)

@@ -12,6 +12,7 @@ import numpy as np
 from ..camera import Camera, ImageSize, check_camera
 from ..codecs.display import Display
 from ..codecs.png_jpeg import Gamma
+from ..codecs.tone import AUTO
 from ..codecs.white_balance import WhiteBalance
 from ..core.errors import SceneError, iterable, number, one_of
 from ..core.files import make_folder, path_name, read_json, write_json
@@ -59,7 +60,7 @@ def write_dataset(
     depth_scale: float | None = None,
     gamma: Gamma = 2.2,
     exposure: float = 0.0,
-    tone: str = "none",
+    tone: str = AUTO,
     white_balance: WhiteBalance | None = None,
     **settings: Unpack[RenderSettings],
 ) -> int:

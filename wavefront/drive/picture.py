@@ -211,6 +211,7 @@ class Picture:
         most = int(self.film.count.max())
         return {
             "lighting": plan.scene.preset,
+            "tone": plan.scene.tone,
             "ground": plan.scene.ground,
             "background": _background_label(settings.values["background"]),
             **settings.labels(),

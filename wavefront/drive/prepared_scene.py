@@ -13,6 +13,7 @@ from ..accel import Accelerator, Geometry, InstanceAccelerator, most_copies
 from ..aovs.geometric import ShapeTable
 from ..arrays.vec import luminance
 from ..camera import Camera
+from ..codecs.tone import CHOSEN_TONE
 from ..compile.scene import CompiledScene
 from ..core.errors import collect_warnings, warn_caller
 from ..core.fingerprint import fingerprint
@@ -22,7 +23,7 @@ from ..integrators import INTEGRATORS, WITH_MIS
 from ..lights import DirectionalLight, Environment, Sky
 from ..media import Medium
 from ..scene import Scene
-from ..scene.lighting import DEFAULT, choose_ground, choose_preset, lighted
+from ..scene.lighting import DEFAULT, choose_ground, choose_preset, is_above, lighted
 from ..settings import AUTO, Settings
 from ..settings.checks import MEDIA, check_combinations
 
@@ -49,6 +50,8 @@ class PreparedScene:
         Name of the light that was added; None if there is none.
     light_is_chosen
         Whether that light was chosen automatically.
+    tone
+        Name of the tone curve that the light was chosen for; "none" for lights of one's own.
     ground
         Whether a ground was added; "shadow" for one of which only the shadow is seen.
     lighted
@@ -66,7 +69,9 @@ class PreparedScene:
         if values["lighting"] == AUTO and self.preset is None and needs_preset(scene, settings, camera):
             self.preset = DEFAULT
         chosen = self.light_is_chosen = values["lighting"] == AUTO and self.preset is not None
-        self.ground = choose_ground(values["ground"], chosen, framed, values["background"], up)
+        self.tone = CHOSEN_TONE if chosen else "none"
+        above = is_above(scene, camera, framed is not None, up)
+        self.ground = choose_ground(values["ground"], chosen, above, values["background"])
         self.lighted = lighted(scene, self.preset, ground=self.ground, up=up, camera=framed)
         if values["integrator"] == "naive":
             _warn_of_unseen_lights(self.lighted)

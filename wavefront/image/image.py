@@ -19,6 +19,7 @@ from ..codecs.display import Display
 from ..codecs.image_data import ERROR, ImageData
 from ..codecs.images import read_picture, write_image
 from ..codecs.png_jpeg import Gamma
+from ..codecs.tone import AUTO
 from ..codecs.white_balance import WhiteBalance
 from ..colors import EFFICACY, rgb, to_photometric
 from ..core.errors import SceneError, as_array, in_brief, iterable, mapping, number, one_of, shape_of
@@ -728,7 +729,7 @@ class Image(Answers):
         self,
         gamma: Gamma = 2.2,
         exposure: float = 0.0,
-        tone: str = "none",
+        tone: str = AUTO,
         white_balance: WhiteBalance | None = None,
     ) -> NDArray[np.uint8]:
         """Return the picture as 8-bit codes for display, the same that `save` writes into a png.
@@ -741,7 +742,8 @@ class Image(Answers):
             Stops (factors of 2) by which the picture is brightened first.
         tone
             The curve that maps radiance above 1 into the range of a display: "none", "reinhard", "aces" or
-            "agx" (`codecs/tone.py` names their sources).
+            "agx" (`codecs/tone.py` names their sources). "auto" is "agx" where `render` chose the light, else
+            "none". Light that was chosen is shown one stop brighter by "agx", whose white is far above 1.
         white_balance
             Color temperature of the light, 1667 to 25000 K, or the linear RGB of a gray object in the
             picture. This color is made neutral after the exposure. 6504 K changes nothing.
@@ -763,7 +765,7 @@ class Image(Answers):
         self,
         gamma: Gamma = 2.2,
         exposure: float = 0.0,
-        tone: str = "none",
+        tone: str = AUTO,
         white_balance: WhiteBalance | None = None,
     ) -> NDArray[np.uint16]:
         """Return the picture as codes of 16 bits; parameters and shape are those of `to_uint8`."""
@@ -774,7 +776,7 @@ class Image(Answers):
         self,
         gamma: Gamma = 2.2,
         exposure: float = 0.0,
-        tone: str = "none",
+        tone: str = AUTO,
         white_balance: WhiteBalance | None = None,
     ) -> Any:
         """Return the picture as a `PIL.Image.Image`, RGB or RGBA; the parameters are those of `to_uint8`."""
@@ -787,7 +789,7 @@ class Image(Answers):
         self,
         gamma: Gamma = 2.2,
         exposure: float = 0.0,
-        tone: str = "none",
+        tone: str = AUTO,
         white_balance: WhiteBalance | None = None,
     ) -> None:
         """Show the picture: in a notebook below the cell, else in the system's viewer.
@@ -808,7 +810,7 @@ class Image(Answers):
         path: str | os.PathLike[str],
         gamma: Gamma = 2.2,
         exposure: float = 0.0,
-        tone: str = "none",
+        tone: str = AUTO,
         white_balance: WhiteBalance | None = None,
         *,
         bits: int = 8,

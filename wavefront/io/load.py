@@ -62,7 +62,7 @@ def load(
         A folder, or several, where files that it refers to may be, too.
     smooth
         Normals of the meshes. "auto" keeps those of the file, and computes missing ones by a crease angle of
-        30°, but for glTF, whose facets are flat then. True, False or another crease angle in degrees, as of
+        60°, but for glTF, whose facets are flat then. True, False or another crease angle in degrees, as of
         `Mesh`, replace those of the file.
     parameters
         Values of the parameters `$name` of an .xml file, in place of their defaults.

@@ -125,11 +125,15 @@ def _tinted(radiance: float, warmth: float) -> tuple[float, float, float]:
 # from any side.
 PRESETS = {
     "studio": Preset(
-        ((-1, 0.1), (-0.4, 0.1), (0.12, 0.045), (0.95, 0.18)),
+        # between the shades of albedos 0.03 and 0.2, so that dark and bright things stand out; brighter
+        # behind the upper edges of things, which get more light
+        ((-1, 0.055), (-0.35, 0.055), (0.0, 0.07), (0.95, 0.09)),
         (
-            SoftBox(-62, 34, 60, 56, _tinted(4.6, 0.02)),  # key
-            SoftBox(75, 34, 66, 54, _tinted(1.35, -0.03)),  # fill
-            SoftBox(140, 34, 40, 40, _tinted(2.6, 0.0)),  # rim
+            SoftBox(-40, 30, 60, 50, _tinted(3.4, 0.02)),  # key
+            SoftBox(40, 36, 60, 50, _tinted(1.6, -0.03)),  # fill
+            SoftBox(-150, 40, 50, 50, _tinted(0.8, 0.0)),  # rim
+            SoftBox(-108, 33, 46, 44, _tinted(1.5, 0.0)),  # side
+            SoftBox(110, 33, 46, 44, _tinted(1.7, 0.0)),  # other side
         ),
     ),
     "softbox": Preset(
@@ -162,11 +166,11 @@ def studio(preset: str = DEFAULT, *, up: ArrayLike = "y", camera: Camera | None 
     Parameters
     ----------
     preset
-        "studio": a large key light from the left, a weak fill from the right and a rim light from behind,
-        before a dark gray gradient. "softbox": one large light before a darker one. "three_point": key, fill
-        and back light, smaller, with harder shadows. "cloudy": an overcast sky, brightest overhead.
-        "daylight": a clear blue sky and the sun, from the left and behind the camera. "even": the same from
-        all around.
+        "studio": a large key light from the left, a fill from the right, and light on the edges from both
+        sides and from behind, before a gray gradient. "softbox": one large light before a darker one.
+        "three_point": key, fill and back light, smaller, with harder shadows. "cloudy": an overcast sky,
+        brightest overhead. "daylight": a clear blue sky and the sun, from the left and behind the camera.
+        "even": the same from all around.
     up
         Up direction of the scene: (3,), or the name of an axis, such as "z".
     camera
@@ -244,30 +248,38 @@ def choose_preset(scene: Scene, lighting: str | None) -> str | None:
     return lighting
 
 
-def choose_ground(
-    ground: bool | str, chosen_light: bool, framed: Camera | None, background: object, up: ArrayLike
-) -> bool | str:
+def choose_ground(ground: bool | str, chosen_light: bool, above: bool, background: object) -> bool | str:
     """Return whether a ground is added; `SHADOW` for one of which only the shadow on it is seen.
 
     Parameters
     ----------
     ground
-        As for `render`: "auto" adds one where everything else is chosen, too.
+        As for `render`: "auto" adds one where the light is chosen, too.
     chosen_light
         Whether the light was chosen because the scene has none.
-    framed
-        The camera, if it was made to frame the scene.
+    above
+        Whether the camera is above the ground: from below, it would hide the scene.
     background
         As for `render`; a ground would cover it. On a transparent one the shadow is seen.
-    up
-        What is up: from below, a ground would hide the scene.
     """
     if not isinstance(ground, str) or ground == SHADOW:
         seen_through = isinstance(background, str) and background == TRANSPARENT
         return SHADOW if ground and seen_through else ground
-    if not chosen_light or framed is None or background is not None:
-        return False
-    return bool(framed.rotation[:, 2] @ turned_up(upward("up", up))[:, 1] > -STEEP)
+    return chosen_light and above and background is None
+
+
+def is_above(scene: Scene, camera: Camera, framed: bool, up: ArrayLike) -> bool:
+    """Return whether a camera sees the ground of a scene from above.
+
+    One that frames the scene must not look up; one of the scene's own must be higher than the ground, and not
+    measure light.
+    """
+    vertical = turned_up(upward("up", up))[:, 1]
+    if framed:
+        return bool(camera.rotation[:, 2] @ vertical > -STEEP)
+    return camera.sensor is None and bool(
+        camera.origin @ vertical > _ground_center(scene, vertical) @ vertical
+    )
 
 
 def lighted(
@@ -300,9 +312,8 @@ def _ground(scene: Scene, preset: str | None, up: ArrayLike, kind: type[Diffuse]
     horizon is visible.
     """
     low, high = scene.bounds
-    center, radius = (low + high) / 2, float(np.linalg.norm(high - low)) / 2
+    radius = float(np.linalg.norm(high - low)) / 2
     vertical = turned_up(upward("up", up))[:, 1]
-    depth = float(np.abs(vertical) @ (high - low)) / 2  # of the lowest corner of the box below its center
     if preset is None:
         albedo = (OWN_LIGHT_GROUND,) * 3
     else:
@@ -312,12 +323,19 @@ def _ground(scene: Scene, preset: str | None, up: ArrayLike, kind: type[Diffuse]
     rim = np.sqrt(texels[:, None] * texels[:, None] + texels * texels)
     alpha = smoothstep((1 - rim) / (1 - GROUND_FADE))
     return plate(
-        center - vertical * depth * (1 + GROUND_GAP),
+        _ground_center(scene, vertical),
         vertical,
         GROUND_REACH * radius,
         material=Material(kind(albedo), alpha=Texture(alpha, channel=0, wrap="clamp")),
         name="ground",
     )
+
+
+def _ground_center(scene: Scene, vertical: Doubles) -> Doubles:
+    """Return the point (3,) just below the lowest corner of a scene's box, below its center."""
+    low, high = scene.bounds
+    depth = float(np.abs(vertical) @ (high - low)) / 2
+    return (low + high) / 2 - vertical * depth * (1 + GROUND_GAP)
 
 
 def _axes(up: ArrayLike, camera: Camera | None) -> Doubles:

@@ -174,7 +174,7 @@ class RenderSettings(TypedDict, total=False):
             "Vertex normals of bare meshes. True averages the normals of the faces around each vertex; "
             "False shows the facets. A crease angle in degrees averages only faces that are within this "
             'angle of each other. These replace the normals that a mesh has. "auto" keeps them. For files '
-            "and trimesh objects that have none, it takes a crease angle of 30°, but glTF then has flat "
+            "and trimesh objects that have none, it takes a crease angle of 60°, but glTF then has flat "
             "facets: docs/formats.md says why. (vertices, faces) and `Mesh` stay as they are.",
             option="normals of meshes: yes, no, a crease angle in degrees, or auto: those of the file, or an "
             "angle of 30 where it has none",
@@ -213,10 +213,10 @@ class RenderSettings(TypedDict, total=False):
             "belongs to the picture alone: the scene, its bounds and the numbers of its shapes stay. "
             '"shadow" adds one of which the camera sees the shadow alone. So does True where the background '
             "is transparent, and the shadow is in `alpha`. "
-            '"auto" adds it where both light and camera are chosen automatically, unless the camera looks '
+            '"auto" adds it where the light is chosen automatically, unless the camera looks '
             "from below or a `background` is given.",
-            option="add a ground that catches the shadow, or leave it out; auto: where light and camera are "
-            "chosen automatically",
+            option="add a ground that catches the shadow, or leave it out; auto: where the light is chosen "
+            "automatically",
             check=auto_or(check_ground),
         ),
     ]

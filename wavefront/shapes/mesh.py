@@ -115,7 +115,7 @@ class Mesh(ColoredShape):
         Used in messages.
     smooth
         Computes the normals. True averages those of all faces around a vertex. A crease angle in degrees
-        averages only faces that are within this angle of each other. "auto" is the angle for files, 30°.
+        averages only faces that are within this angle of each other. "auto" is the angle for files, 60°.
         Vertices at one position count as one. Vertices on creases are split, so that the mesh may have more
         of them. Not with `normals`.
 

@@ -12,7 +12,7 @@ from ..arrays.vec import Bools, Doubles, Floats, Ints, cross, dot, length, norma
 from ..core.errors import SceneError, in_brief, number, shape_of
 
 AUTO = "auto"
-CREASE = 30.0  # degrees between the normals of two faces above which their edge is sharp, for "auto"
+CREASE = 60.0  # degrees between the normals of two faces above which their edge is sharp, for "auto"
 # Corners at one vertex: where more meet, as in the apex of a cone of many sides, facets keep their normals,
 # as the work grows with the square of their number.
 MOST_CORNERS = 256

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..codecs import png_jpeg
-from ..codecs.tone import TONES
+from ..codecs.tone import TONE_NAMES
 from ..core.errors import RenderError, SceneError, one_of
 from ..denoising import FEW, is_quick
 from ..image import Image
@@ -166,7 +166,7 @@ class Page:
         self._state = gui.add_html(_line("…"))  # markdown would be compiled for each picture
         layer = gui.add_dropdown("layer", tuple(CHOICES), initial_value="rgb")
         layer.on_update(self._on(lambda event: self._show_as(choice=event.target.value)))
-        tone = gui.add_dropdown("tone", tuple(TONES), initial_value=self._tone)
+        tone = gui.add_dropdown("tone", TONE_NAMES, initial_value=self._tone)
         tone.on_update(self._on(lambda event: self._show_as(tone=event.target.value)))
         exposure = gui.add_slider("exposure", -STOPS, STOPS, 0.1, 0.0, hint="stops")
         exposure.on_update(self._on(lambda event: self._show_as(exposure=event.target.value)))
@@ -245,7 +245,7 @@ class Page:
         if choice is not None:
             one_of("layer", choice, CHOICES)
         if tone is not None:
-            one_of("tone", tone, TONES)
+            one_of("tone", tone, TONE_NAMES)
         if exposure is not None:
             exposure = within("exposure", exposure, -STOPS, STOPS)
         with self._lock:

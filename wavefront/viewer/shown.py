@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..arrays.vec import Floats
+from ..codecs.tone import AUTO
 from ..film.aov_names import GUIDES
 from ..image import Image
 from ..image.plot import aov_colors, id_colors
@@ -26,7 +27,7 @@ RADIANCE = ("rgb", "denoised")
 VIEWER_AOVS = tuple(name for names in CHOICES.values() for name in names)
 
 
-def shown_codes(image: Image, choice: str, exposure: float, tone: str = "none") -> NDArray[np.uint8]:
+def shown_codes(image: Image, choice: str, exposure: float, tone: str = AUTO) -> NDArray[np.uint8]:
     """Return what a page shows of a picture, (H, W, 3).
 
     Parameters

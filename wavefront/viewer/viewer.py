@@ -12,7 +12,7 @@ from importlib.util import find_spec
 from typing import Any, Self, Unpack
 
 from ..camera import Camera
-from ..codecs.tone import TONES
+from ..codecs.tone import AUTO, TONE_NAMES
 from ..core.errors import RenderError, SceneError, one_of
 from ..core.suggestions import suggests_keywords
 from ..drive import Session
@@ -260,7 +260,7 @@ def view(
     host: str = "127.0.0.1",
     port: int = 8080,
     token: str | bool = True,
-    tone: str = "none",
+    tone: str = AUTO,
     open_browser: bool = True,
     block: bool | None = None,
     **settings: Unpack[RenderSettings],
@@ -316,7 +316,7 @@ def view(
     if not isinstance(port, int) or not 0 <= port < 2**16:
         raise SceneError(f"port is {port!r}; it must be a whole number from 0 to 65535")
     token = token_of(token)
-    one_of("tone", tone, TONES)
+    one_of("tone", tone, TONE_NAMES)
     coloring = coloring_of(settings)
     for name in COLORING:
         settings.pop(name, None)  # type: ignore[misc]
