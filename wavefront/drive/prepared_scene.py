@@ -63,8 +63,22 @@ class PreparedScene:
     """
 
     def __init__(self, scene: Scene, settings: Settings, camera: Camera, framed: Camera | None) -> None:
-        self.scene = scene
-        values = settings.values
+        self.scene, self._geometries = scene, list[Geometry]()
+        self._fingerprint: str | None = None
+        self._light(settings, camera, framed)
+        if settings.values["integrator"] == "naive":
+            _warn_of_unseen_lights(self.lighted)
+        _warn_of_light_in_endless_fog(self.lighted)
+        with phase("building the scene", settings.values["progress"]):
+            compiled = self._compile(settings)
+        if compiled.media is not None and not compiled.media.only_absorbs:
+            check_combinations({**settings.values, MEDIA: True})
+        self.compiled = replace(compiled, roulette_after=settings.roulette_after)
+        self.shapes = ShapeTable(self.lighted.shapes)
+
+    def _light(self, settings: Settings, camera: Camera, framed: Camera | None) -> None:
+        """Add the light and the ground that settings ask for."""
+        scene, values = self.scene, settings.values
         self.preset, up = choose_preset(scene, values["lighting"]), scene.vertical(values["up"])
         if values["lighting"] == AUTO and self.preset is None and needs_preset(scene, settings, camera):
             self.preset = DEFAULT
@@ -73,31 +87,25 @@ class PreparedScene:
         above = is_above(scene, camera, framed is not None, up)
         self.ground = choose_ground(values["ground"], chosen, above, values["background"])
         self.lighted = lighted(scene, self.preset, ground=self.ground, up=up, camera=framed)
-        if values["integrator"] == "naive":
-            _warn_of_unseen_lights(self.lighted)
-        _warn_of_light_in_endless_fog(self.lighted)
-        self._geometries: list[Geometry] = []
-        self._fingerprint: str | None = None
-        with phase("building the scene", settings.values["progress"]):
-            make_accelerator = scene.accelerators.maker(settings.values["accel"])
 
-            def make(geometry: Geometry) -> Accelerator:
-                self._geometries.append(geometry)
-                return make_accelerator(geometry)
+    def _compile(self, settings: Settings) -> CompiledScene:
+        """Compile the scene, and note what its accelerators are built from."""
+        values = settings.values
+        make_accelerator = self.scene.accelerators.maker(values["accel"])
 
-            compiled = compile_scene(
-                self.lighted,
-                make,
-                settings.values["light_sampler"],
-                most_copies(settings.values["accel"]),
-                mis=INTEGRATORS.find(settings.values["integrator"]) in WITH_MIS,
-                caustics=settings.values["caustics"],
-                asked={"background": settings.background_color, "features": values["features"]},
-            )
-        if compiled.media is not None and not compiled.media.only_absorbs:
-            check_combinations({**values, MEDIA: True})
-        self.compiled = replace(compiled, roulette_after=settings.roulette_after)
-        self.shapes = ShapeTable(self.lighted.shapes)
+        def make(geometry: Geometry) -> Accelerator:
+            self._geometries.append(geometry)
+            return make_accelerator(geometry)
+
+        return compile_scene(
+            self.lighted,
+            make,
+            values["light_sampler"],
+            most_copies(values["accel"]),
+            mis=INTEGRATORS.find(values["integrator"]) in WITH_MIS,
+            caustics=values["caustics"],
+            asked={"background": settings.background_color, "features": values["features"]},
+        )
 
     def fingerprint(self) -> str:
         """Return the fingerprint of all that rays can meet.

@@ -14,7 +14,7 @@ from typing import Any, Self, Unpack
 from ..aovs.boxes import silhouettes
 from ..arrays.vec import Bools
 from ..camera import Camera, ImageSize, check_camera, image_size
-from ..core.errors import RenderError, SceneError, warn_caller
+from ..core.errors import Interrupted, RenderError, SaveError, SceneError, warn_caller
 from ..core.interrupt import InterruptHandler
 from ..core.shared import STOP, SharedInt
 from ..core.suggestions import suggests_keywords
@@ -444,29 +444,19 @@ class Session:
             warn_of_long_paths(self._settings.values["max_bounces"])
 
     def _end(self) -> Image | None:
-        """Return the last picture when the loop is over, or raise what ended it; None if there is none."""
+        """Return the last picture when the work is over, or raise what ended it; None if there is none."""
         picture, work, settings = self._picture, self._work, self._settings
-        failure = work.failure
         self._ended = True
-        if failure is not None or self._interrupted:
-            self._pool.close()
-        elif self._once:
-            self._pool.begin_closing()
-        else:
-            self._pool.cancel()
+        self._leave_workers()
         picture.release_reserve()
-        if self._dropped and failure is None and not self._interrupted:
+        if self._dropped and not self._failed:
             return None
         not_written = picture.keep(self.command)
         image = picture.last_image(self._interrupted or self._stopped, free_sums=self._once)
-        if not_written is not None and (failure is not None or self._interrupted):
-            warn_caller(f"the checkpoint was not written: {not_written}")
-        if failure is not None:
-            raise render_error(failure, image) from failure
-        if not self._interrupted and not self._stopped:
+        if not (self._failed or self._stopped):
             check_last_image(image, picture, work.time_up, self._monitor.surfaces.value)
-        if self._interrupted:
-            raise interrupted(image, settings.target_spp, "" if not_written else self._how_to_go_on())
+        if self._failed:
+            raise self._error(image, not_written) from work.failure
         if not_written is not None:
             raise RenderError(f"the checkpoint was not written: {not_written}", image) from not_written
         if not picture.samples:
@@ -475,6 +465,27 @@ class Session:
         if not (self._interrupted or self._stopped) and settings.values["progress"] in (None, True):
             self.tell_hints(image)
         return image
+
+    def _leave_workers(self) -> None:
+        """Close the pool, or have its workers wait for another picture."""
+        if self._failed:
+            self._pool.close()
+        elif self._once:
+            self._pool.begin_closing()
+        else:
+            self._pool.cancel()
+
+    def _error(self, image: Image, not_written: SaveError | MemoryError | None) -> RenderError | Interrupted:
+        """Return the error of work that failed or was interrupted, with the picture so far."""
+        if not_written is not None:
+            warn_caller(f"the checkpoint was not written: {not_written}")
+        if self._work.failure is not None:
+            return render_error(self._work.failure, image)
+        return interrupted(image, self._settings.target_spp, "" if not_written else self._how_to_go_on())
+
+    @property
+    def _failed(self) -> bool:
+        return self._work.failure is not None or self._interrupted
 
     @property
     def _interrupted(self) -> bool:

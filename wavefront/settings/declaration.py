@@ -310,7 +310,7 @@ class RenderSettings(TypedDict, total=False):
         Setting(
             "auto",
             'Ray queries by "numpy" or by "embree" (`pip install embreex`). "auto" takes Embree where it '
-            "is installed.",
+            "is installed and there are triangles.",
             option="ray queries: auto, numpy or embree",
             choices=ACCELERATORS,
         ),
@@ -330,8 +330,9 @@ class RenderSettings(TypedDict, total=False):
             None,
             'The kind of workers: "processes", "threads", "spawn" or "forkserver" (processes that share '
             "no memory with this one); a `concurrent.futures.Executor`, a function that returns one, or a "
-            "`dask.distributed.Client`. By default a longer render takes processes, which are faster, and "
-            "a short one threads. The picture is the same. docs/scale.md tells more.",
+            "`dask.distributed.Client`. By default a longer render takes processes, which are faster, "
+            "a short one threads, and one that is a single small wave none: the caller traces it. The "
+            "picture is the same. docs/scale.md tells more.",
             option="kind of workers (default: the faster here)",
             choices=EXECUTORS,
         ),
