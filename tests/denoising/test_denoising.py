@@ -169,13 +169,6 @@ def test_without_errors(denoiser) -> None:
         assert (found.noisy.standard_error is None) == (error is None)
 
 
-def test_rows_do_not_depend_on_each_other(monkeypatch) -> None:
-    image, _ = scene_like()
-    whole = image.denoise("nonlocal_means").rgb
-    monkeypatch.setattr("wavefront.denoising.nonlocal_means.ROWS", 5)
-    assert (image.denoise("nonlocal_means").rgb == whole).all()
-
-
 def test_holes() -> None:
     values = np.arange(24, dtype=np.float32).reshape(4, 2, 3)
     values[1, 0, 2] = np.nan

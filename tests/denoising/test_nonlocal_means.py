@@ -6,6 +6,7 @@ Every constant of the filter stands here once more, so none can change unnoticed
 import numpy as np
 import pytest
 
+from wavefront.denoising import nonlocal_means as module
 from wavefront.denoising.noisy import Guide, NoisyPicture
 from wavefront.denoising.nonlocal_means import nonlocal_means
 
@@ -30,6 +31,7 @@ def picture(albedo: bool, normal: bool, noise: float = 0.1) -> NoisyPicture:
     rgb = exact + rng.normal(size=(h, w, 3)) * error
     rgb[2, 3] = 0.5  # without any noise, beside others
     error[2, 3] = 0
+    rgb[6, 8], error[6, 8] = 5, 5  # of a rare bright sample
     return NoisyPicture(
         rgb.astype(np.float32),
         error.astype(np.float32),
@@ -51,41 +53,45 @@ def blurred(values: np.ndarray) -> np.ndarray:
     return out
 
 
-def squared_difference(a, va, b, vb, damping, least):
-    """F. Rousselle, C. Knaus and M. Zwicker 2012, equation 3."""
-    return (np.square(a - b) - (va + np.minimum(va, vb))) / (damping**2 * np.maximum(va + vb, least))
+def square(values: np.ndarray) -> np.ndarray:
+    """Squares, summed over channels."""
+    return np.square(values).sum(-1)
 
 
-def weighted_means(mean, variance, damping, reach, patch, guides):
-    """Each pixel as the mean of those about it, by colors over patches and by guides."""
-    out, spread = np.empty_like(mean), np.empty_like(mean)
-    margin, side = reach + patch, 2 * patch + 1
-    wide, noise = mirrored(mean, margin), mirrored(variance, margin)
-    guides = [
-        (values, error, mirrored(values, margin), mirrored(error, margin), scale)
-        for values, error, scale in guides
-    ]
-    for y, x in np.ndindex(mean.shape[:2]):
-        weights, values, variances = [], [], []
-        here = slice(y + reach, y + reach + side), slice(x + reach, x + reach + side)
-        for i in range(2 * reach + 1):
-            for j in range(2 * reach + 1):
-                there = slice(y + i, y + i + side), slice(x + j, x + j + side)
-                middle = y + i + patch, x + j + patch
-                found = squared_difference(wide[here], noise[here], wide[there], noise[there], damping, 1e-10)
-                distance = np.mean(found)
-                for guide, error, guide_near, error_near, scale in guides:
-                    each = squared_difference(
-                        guide[y, x], error[y, x], guide_near[middle], error_near[middle], 1.0, scale
-                    )
-                    distance = max(distance, each.max())
-                weights.append(np.exp(-max(distance, 0)))
-                values.append(wide[middle])
-                variances.append(noise[middle])
-        weights = np.array(weights)
-        out[y, x] = weights @ np.array(values) / weights.sum()
-        spread[y, x] = weights**2 @ np.array(variances) / weights.sum() ** 2
-    return out, spread
+def trusted(variance: np.ndarray) -> np.ndarray:
+    """What pixels count for: less than 1 where the noise is far more than about them."""
+    variance = variance + 1e-10
+    wide, out = mirrored(np.sqrt(variance)[..., None], 7), np.empty_like(variance)
+    for y, x in np.ndindex(variance.shape):
+        out[y, x] = np.clip(4 * np.square(wide[y : y + 15, x : x + 15].mean()) / variance[y, x], 1e-6, 1)
+    return out
+
+
+def weighted_means(trust, averaged, spread, compared, variance, damping, reach, patch, guides):
+    """Each pixel as the mean of those about it, by colors over patches and by guides; and its variance.
+
+    Distances are those of F. Rousselle, C. Knaus and M. Zwicker 2012, equation 3, of sums over channels.
+    """
+    h, w = variance.shape
+    out, noise = np.empty_like(averaged), np.empty_like(spread)
+    side = 2 * patch + 1
+    wide, errors = mirrored(compared, patch), mirrored(variance[..., None], patch)[..., 0] + 1e-10
+    for y, x in np.ndindex(h, w):
+        weights = np.zeros((h, w))
+        own = slice(y, y + side), slice(x, x + side)
+        for i in range(max(y - reach, 0), min(y + reach + 1, h)):
+            for j in range(max(x - reach, 0), min(x + reach + 1, w)):
+                other = slice(i, i + side), slice(j, j + side)
+                va, vb = errors[own], errors[other]
+                explained = va + np.minimum(va, vb)
+                distance = ((square(wide[own] - wide[other]) - explained) / (va + vb)).mean() / damping**2
+                for guide, error, scale in guides:
+                    unit = max(error[y, x] + error[i, j], scale)
+                    distance = max(distance, square(guide[y, x] - guide[i, j]) / unit)
+                weights[i, j] = trust[i, j] * max(1 - max(distance, 0) / 8, 0) ** 8
+        out[y, x] = np.tensordot(weights, averaged) / weights.sum()
+        noise[y, x] = (weights**2 * spread).sum() / weights.sum() ** 2
+    return out, noise
 
 
 def filtered(noisy: NoisyPicture) -> np.ndarray:
@@ -94,12 +100,18 @@ def filtered(noisy: NoisyPicture) -> np.ndarray:
     for guide, scale in ((noisy.albedo, 3e-3), (noisy.normal, 0.1)):
         if guide is not None:
             values, error = (np.asarray(each, float) for each in (guide.values, guide.squared_error))
-            guides.append((*weighted_means(values, blurred(error), 1.0, 3, 2, []), scale))
+            error = blurred(error).sum(-1)
+            guides.append(
+                (*weighted_means(np.ones(SIZE), values, error, values, error, 1.0, 3, 2, []), scale)
+            )
     if noisy.albedo is not None:
         divisor = np.maximum(guides[0][0], 0) + 0.02
     mean = np.asarray(noisy.rgb, float) / divisor
-    variance = blurred(np.asarray(noisy.squared_error, float) / divisor**2)
-    return weighted_means(mean, variance, 0.6, 7, 1, guides)[0] * divisor
+    variance = blurred(np.asarray(noisy.squared_error, float) / divisor**2).sum(-1)
+    trust = trusted(variance)
+    first, left = weighted_means(trust, mean, variance, mean, variance, 0.6, 5, 1, guides)
+    left = blurred(left[..., None])[..., 0] + 0.03 * variance
+    return weighted_means(trust, mean, variance, first, left, 1.0, 7, 1, guides)[0] * divisor
 
 
 @pytest.mark.parametrize(("albedo", "normal"), [(False, False), (True, True)])
@@ -114,3 +126,53 @@ def test_pictures_of_exact_values_stay() -> None:
     rgb[:, 5:] += np.float32(1e-4)
     found = nonlocal_means(NoisyPicture(rgb, np.zeros_like(rgb), None, None))
     np.testing.assert_allclose(found, rgb, atol=2e-6)
+
+
+def box(noise: float, seed: int = 0) -> tuple[NoisyPicture, np.ndarray]:
+    """Two walls that differ in albedo and normal, and by 10 % in light; and the exact picture."""
+    rng = np.random.default_rng(seed)
+    right = np.arange(40)[None, :, None] >= 20
+    albedo = np.where(right, (0.6, 0.5, 0.4), (0.4, 0.5, 0.6)) * np.ones((30, 1, 1))
+    normal = np.where(right, (1.0, 0, 0), (0, 0, 1.0)) * np.ones((30, 1, 1))
+    exact = albedo * np.where(right, 0.9, 1.0)
+    error = noise * exact
+    guides = (Guide(each.astype(np.float32), np.zeros((30, 40, 3), np.float32)) for each in (albedo, normal))
+    rgb = (exact + rng.normal(size=exact.shape) * error).astype(np.float32)
+    return NoisyPicture(rgb, error.astype(np.float32), *guides), exact
+
+
+def test_edges_of_guides_stay() -> None:
+    """Where the noise hides them: the light left and right differs by 10 %, the noise is 30 %."""
+    noisy, exact = box(0.3)
+    found = nonlocal_means(noisy)
+    assert np.square(found - exact).mean() < 0.02 * np.square(noisy.rgb - exact).mean()
+    light = (found / exact * np.where(np.arange(40)[:, None] < 20, 1.0, 0.9)).mean((0, 2))
+    assert light[17:20].mean() - light[20:23].mean() == pytest.approx(0.1, abs=0.03)
+
+
+def test_a_picture_of_little_noise_does_not_get_worse() -> None:
+    for noise in (0.01, 0.001):
+        noisy, exact = box(noise)
+        noisy.albedo = noisy.normal = None
+        assert np.square(nonlocal_means(noisy) - exact).mean() < np.square(noisy.rgb - exact).mean()
+
+
+def test_lone_bright_pixels_are_removed() -> None:
+    """A pixel of one bright sample has an error as large as itself; it does not spread."""
+    noisy, exact = box(0.05)
+    noisy.rgb[15, 10] = 40
+    noisy.error[15, 10] = 40
+    found = nonlocal_means(noisy)
+    assert found[15, 10].max() < 3
+    others = np.abs(found - exact).max(-1)
+    others[13:18, 8:13] = 0
+    assert others.max() < 0.1
+
+
+@pytest.mark.parametrize(("tile", "cores"), [((5, 4), 1), ((3, 64), 3)])
+def test_tiles_and_cores_do_not_change_bits(tile, cores, monkeypatch) -> None:
+    noisy = picture(True, True)
+    whole = nonlocal_means(noisy)
+    monkeypatch.setattr(module, "TILE", tile)
+    monkeypatch.setattr(module, "core_count", lambda: cores)
+    assert nonlocal_means(noisy).tobytes() == whole.tobytes()

@@ -24,6 +24,7 @@ from functools import partial
 from pathlib import Path
 from typing import Any, Protocol, TypeAlias, runtime_checkable
 
+from ..core.cores import core_count
 from ..core.errors import SceneError, collect_warnings, warn_caller
 from ..core.registry import Registry
 from ..core.shared import AT_ONCE, SharedInt, Stopped
@@ -332,14 +333,10 @@ def worker_count(workers: int | None, executor: str | ExecutorLike | None = None
         If it is not a whole number of at least 1.
     """
     if workers is None:
-        return _workers_in(executor) or _cores()
+        return _workers_in(executor) or core_count()
     if isinstance(workers, bool) or not isinstance(workers, int) or workers < 1:
         raise SceneError(f"workers is {workers!r}; it must be a whole number of at least 1")
     return workers
-
-
-def _cores() -> int:
-    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 
 def _workers_in(executor: str | ExecutorLike | None) -> int | None:
