@@ -97,7 +97,7 @@ def weighted_means(trust, averaged, spread, compared, variance, damping, reach, 
 def filtered(noisy: NoisyPicture) -> np.ndarray:
     """The whole filter."""
     guides, divisor = [], 1.0
-    for guide, scale in ((noisy.albedo, 3e-3), (noisy.normal, 0.1)):
+    for guide, scale in ((noisy.albedo, 3e-3), (noisy.normal, 0.015)):
         if guide is not None:
             values, error = (np.asarray(each, float) for each in (guide.values, guide.squared_error))
             error = blurred(error).sum(-1)
@@ -111,7 +111,9 @@ def filtered(noisy: NoisyPicture) -> np.ndarray:
     trust = trusted(variance)
     first, left = weighted_means(trust, mean, variance, mean, variance, 0.6, 5, 1, guides)
     left = blurred(left[..., None])[..., 0] + 0.03 * variance
-    return weighted_means(trust, mean, variance, first, left, 1.0, 7, 1, guides)[0] * divisor
+    second = weighted_means(trust, mean, variance, first, left, 1.0, 7, 1, guides)[0]
+    seen = variance / (variance + square(0.01 * second) + 1e-10)
+    return (mean + seen[..., None] * (second - mean)) * divisor
 
 
 @pytest.mark.parametrize(("albedo", "normal"), [(False, False), (True, True)])

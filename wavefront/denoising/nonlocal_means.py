@@ -31,8 +31,9 @@ PATCH = 1  # pixels from the middle of a patch to its sides; colors are compared
 DAMPING, SECOND_DAMPING = 0.6, 1.0  # standard deviations of noise that count as a difference of 1
 LEFT = 0.03  # of a pixel's variance, at least that which the first pass leaves; weights follow the noise
 GUIDE_REACH, GUIDE_PATCH, GUIDE_DAMPING = 3, 2, 1.0  # of the filter of the guides themselves
-ALBEDO_SCALE, NORMAL_SCALE = 3e-3, 0.1  # squared differences of guides that are always allowed
+ALBEDO_SCALE, NORMAL_SCALE = 3e-3, 0.015  # squared differences of guides that are always allowed
 MOST_NOISE, LEAST_TRUST = 4.0, 1e-6  # variances over the usual one that count in full; of a pixel's weight
+VISIBLE = 0.01  # of a pixel's value: noise of which half is removed
 LEAST_ALBEDO = 0.02  # added to the albedo that colors are divided by
 LEAST_VARIANCE = 1e-10
 FARTHEST = 8  # the distance from which on a weight is 0
@@ -56,7 +57,8 @@ def nonlocal_means(picture: NoisyPicture) -> Floats:
     first = _weighted_means(noisy, trust, _Likeness.of(noisy, DAMPING, PATCH, guides), REACH)
     pilot = _Noisy(first.mean, _blurred(first.variance) + np.float32(LEFT) * noisy.variance)
     second = _weighted_means(noisy, trust, _Likeness.of(pilot, SECOND_DAMPING, PATCH, guides), SECOND_REACH)
-    return np.ascontiguousarray(np.moveaxis(second.mean * divisor, 0, 2))
+    clean = noisy.mean + _visible(noisy.variance, second.mean) * (second.mean - noisy.mean)
+    return np.ascontiguousarray(np.moveaxis(clean * divisor, 0, 2))
 
 
 @soa
@@ -145,6 +147,12 @@ def _filtered(guide: Guide) -> _Noisy:
     noisy = _Noisy(_planes(guide.values), _blurred(_planes(guide.squared_error).sum(0)))
     likeness = _Likeness.of(noisy, GUIDE_DAMPING, GUIDE_PATCH, [])
     return _weighted_means(noisy, np.ones_like(noisy.variance), likeness, GUIDE_REACH)
+
+
+def _visible(variance: Floats, mean: Floats) -> Floats:
+    """Return how much of the noise (h, w) is removed: little of what nobody sees, which costs detail."""
+    seen = np.square(np.float32(VISIBLE) * mean).sum(0)
+    return variance / (variance + seen + np.float32(LEAST_VARIANCE))
 
 
 def _trust(variance: Floats) -> Floats:

@@ -538,7 +538,7 @@ class Image(Answers):
         ----------
         denoiser
             "oidn": Intel Open Image Denoise, by pyoidn (`pip install pyoidn`). "nonlocal_means": a filter of
-            this package, slower and not as good, which needs no other package. "auto": "oidn" if it is
+            this package, slower, which needs no other package. "auto": "oidn" if it is
             installed. `metadata["denoiser"]` says which it was.
 
         Raises
