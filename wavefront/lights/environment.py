@@ -161,6 +161,11 @@ class Environment(Parametrized, FarLight):
         else:
             self._radiance, self._image = rgb("Environment radiance", radiance) * self._scale, None
 
+    def sample_in_texels(self) -> None:
+        """Let light samples take means over texels of the image, which must vary slowly (octahedral.py)."""
+        assert self._image is not None
+        self._image = replace(self._image, in_texels=True)
+
     def record(self, center: Doubles) -> InfiniteLight:
         """Return the light as a record of one column."""
         return ConstantEnvironment(self.radiance) if self._image is None else self._image

@@ -23,7 +23,8 @@ from ..sampling.discrete import Distribution2D
 from ..textures.image import Texture
 from .base import LightSample, Receiver
 from .infinite import InfiniteLight, at_infinity, through_scene, turned
-from .product import NO_NORMAL, CosineProduct, octahedral_bins
+from .octahedral import OctahedralEnvironment
+from .product import NO_NORMAL, CosineProduct, bins_of
 
 LEAST_VARIANCE = 0.1  # of radiance over its squared mean, all around, that is worth light samples
 CHUNK = 1 << 14  # texels whose light is summed at a time, so that sums take no fresh memory
@@ -48,7 +49,8 @@ class ImageEnvironment(InfiniteLight):
     share: float = 1.0  # of the light that light samples are to bring
     product: CosineProduct | None = None  # draws that share
     normals: Ints | None = None  # (n,) what it is drawn for; None for no normal in particular
-    made: Self | None = None  # what `compensated` has returned
+    in_texels: bool = False  # light samples may take means over texels: it varies slowly
+    made: InfiniteLight | None = None  # what `compensated` has returned
     takes_receiver: ClassVar[bool] = True
 
     @classmethod
@@ -92,7 +94,7 @@ class ImageEnvironment(InfiniteLight):
             poles=poles,
         )
 
-    def compensated(self) -> Self:
+    def compensated(self) -> Any:
         """Draw directions by how much brighter than the mean they are, and leave the rest to BSDF samples.
 
         An image that is nearly the same all around is left to BSDF samples. The tables are made once.
@@ -101,7 +103,9 @@ class ImageEnvironment(InfiniteLight):
             self.made = self._compensated()
         return self.made
 
-    def _compensated(self) -> Self:
+    def _compensated(self) -> Any:
+        if self.in_texels:
+            return OctahedralEnvironment.of(self, LEAST_VARIANCE) or replace(self, share=0.0)
         uniform = (0.5 * len(self.step) * self.step[:, None]).astype(f4)  # 1/(4π) per steradian
         more = self.texels.weights() - uniform  # density over the unit square
         if (more * more / uniform).mean(dtype=np.float64) < LEAST_VARIANCE:
@@ -144,8 +148,7 @@ class ImageEnvironment(InfiniteLight):
         """Return the light as it is sampled for the normals of opaque surfaces."""
         if self.product is None:
             return self
-        normals = np.where(receiver.opaque, octahedral_bins(receiver.normal), NO_NORMAL)
-        return replace(self, normals=normals)
+        return replace(self, normals=bins_of(receiver))
 
     def _drawn_for(self, n: int) -> Ints:
         return np.broadcast_to(NO_NORMAL if self.normals is None else self.normals, n)

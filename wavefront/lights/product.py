@@ -7,11 +7,13 @@ import numpy as np
 from ..arrays.elementary import sin_cos_turns
 from ..arrays.vec import Doubles, Floats, Ints, f4, take
 from ..sampling.discrete import Inversion, within_cell
+from .base import Receiver
 
 NORMALS = 16  # squared: the normals of the table, on an octahedron
 NO_NORMAL = NORMALS * NORMALS  # number of what has none
 CELLS = 16, 32  # rows and columns at most, of parts of the image that a normal weighs as wholes
 MARGIN = 0.08  # added to cosines: a cell, and the normals of a bin, reach beyond their middles
+EDGE = f4(2.0**-12)  # of a texel: how far from its edge samples stay, more than their rounding
 PLAIN = 0.02  # share of directions that are drawn by light alone
 
 
@@ -30,17 +32,28 @@ class CosineProduct:
         (H, W) in proportion to the light of each texel; an equirectangular image, top row first. It is kept.
     rotation
         (3, 3) to world from the image; None where they are the same.
+    directions
+        (3, H, W) of the texels; None for those of an equirectangular image.
+    cells
+        Rows and columns of cells, at most.
     """
 
-    def __init__(self, light: Floats, rotation: Floats | None) -> None:
+    def __init__(
+        self,
+        light: Floats,
+        rotation: Floats | None,
+        directions: Doubles | None = None,
+        cells: tuple[int, int] = CELLS,
+    ) -> None:
         self.shape = height, width = light.shape
-        rows, columns = min(CELLS[0], height), min(CELLS[1], width)
+        rows, columns = min(cells[0], height), min(cells[1], width)
         self._row_edges = np.arange(rows + 1) * height // rows
         self._column_edges = np.arange(columns + 1) * width // columns
         self._cell_row = np.repeat(np.arange(rows), np.diff(self._row_edges))
         self._cell_column = np.repeat(np.arange(columns), np.diff(self._column_edges))
         self._cells = rows, columns
-        mass, middle = self._cell_light(light)
+        self._cell_of: Ints | None = None  # (H·W,) of texels; made where it is used
+        mass, middle = self._cell_light(light) if directions is None else self._light_along(light, directions)
         if rotation is not None:
             middle = np.stack([sum(row[k] * middle[k] for k in range(3)) for row in rotation.astype(float)])
         self._choose_cells(mass, middle)
@@ -65,6 +78,13 @@ class CosineProduct:
                 if factor is not None:
                     part *= factor
                 out[row] = np.add.reduceat(part, self._column_edges[:-1])
+        return mass, np.divide(middle, mass, out=np.zeros_like(middle), where=mass > 0)
+
+    def _light_along(self, light: Floats, directions: Doubles) -> tuple[Doubles, Doubles]:
+        """Return the same, of texels in given directions (3, H, W)."""
+        parts = np.concatenate([light[None], light * directions])
+        rows = np.add.reduceat(parts, self._row_edges[:-1], axis=1, dtype=np.float64)
+        mass, *middle = np.add.reduceat(rows, self._column_edges[:-1], axis=2)
         return mass, np.divide(middle, mass, out=np.zeros_like(middle), where=mass > 0)
 
     def _choose_cells(self, mass: Doubles, middle: Doubles) -> None:
@@ -106,7 +126,24 @@ class CosineProduct:
         normal
             (n,) numbers of normals.
         """
-        (rows, columns), (height, width) = self._cells, self.shape
+        column, row, x, v, pdf = self._sample(u, normal)
+        return within_cell(column, x, self.shape[1]), within_cell(row, v, self.shape[0]), pdf
+
+    def sample_texels(self, u: Floats, normal: Ints) -> tuple[Ints, Floats, Floats, Floats]:
+        """Return the texels (n,) of such points first; these keep a small distance from edges of texels."""
+        height, width = self.shape
+        column, row, x, y, pdf = self._sample(u, normal)
+        for place, first, size in ((x, column, width), (y, row, height)):
+            np.clip(place, EDGE, f4(1) - EDGE, out=place)
+            place += first
+            place *= f4(1 / size)
+        row *= width
+        row += column
+        return row, x, y, pdf
+
+    def _sample(self, u: Floats, normal: Ints) -> tuple[Ints, Ints, Floats, Floats, Floats]:
+        """Return columns and rows (n,) of texels, places within them, and the density over the square."""
+        (rows, columns), width = self._cells, self.shape[1]
         flat, v = self._rows.find(u[1], normal)
         row = flat - normal * rows
         cell, x = self._columns.find(u[0], flat)
@@ -119,7 +156,16 @@ class CosineProduct:
         flat, x = self._texel_columns.find(x, of)
         texel_column = flat - of * self._texel_columns.items + take(self._column_edges, column)
         pdf = density * take(self._light, texel_row * width + texel_column)
-        return within_cell(texel_column, x, width), within_cell(texel_row, v, height), pdf
+        return texel_column, texel_row, x, v, pdf
+
+    def pdf_of_texels(self, texel: Ints, normal: Ints) -> Floats:
+        """Return the density over the unit square, (n,), in texels (n,), for normals (n,)."""
+        if self._cell_of is None:
+            of = self._cell_row[:, None] * self._cells[1] + self._cell_column
+            self._cell_of = of.ravel().astype(np.int32)  # half the memory
+        cell = normal * (self._cells[0] * self._cells[1])
+        cell += take(self._cell_of, texel)
+        return take(self._density, cell) * take(self._light, texel)
 
     def pdf(self, x: Floats, y: Floats, normal: Ints) -> Floats:
         """Return the density over the unit square, (n,), at x, y (n,) in [0, 1], for normals (n,)."""
@@ -158,3 +204,10 @@ def octahedral_bins(normal: Floats) -> Ints:
     i *= NORMALS
     i += j
     return i
+
+
+def bins_of(receiver: Receiver) -> Ints:
+    """Return the numbers (n,) of the normals that directions are drawn for; `NO_NORMAL` of clear surfaces."""
+    if receiver.bins is not None:
+        return receiver.bins
+    return np.where(receiver.opaque, octahedral_bins(receiver.normal), NO_NORMAL)

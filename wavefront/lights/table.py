@@ -12,6 +12,7 @@ from ..arrays.vec import ALL, Doubles, Floats, Ints, Lanes, f4, put, take
 from ..sampling.mis import power_heuristic
 from .base import Emitters, LightRecord, LightSample, Receiver, emitters_of, lit_for, sampled_li
 from .choice import LightSampler, LightSamplerMaker
+from .octahedral import OctahedralEnvironment
 from .samplers import LIGHT_SAMPLERS, SingleLightSampler, SubsetLightSampler
 
 
@@ -63,6 +64,8 @@ class LightTable:
         # (lights,) those with `le` by surface; None if there are none
         self.varies = varies.astype(np.bool_) if varies.any() else None
         self.reads = {name for kind in kinds for name in kind.reads}  # attributes of surfaces, for `le`
+        last = self.kinds[-1] if self.kinds else None  # lights at infinity come last
+        self.texels = last if isinstance(last, OctahedralEnvironment) else None
         self.takes_receiver = any(kind.takes_receiver for kind in kinds)
         self.delta_of = np.array([kind.delta for kind in kinds], np.bool_)[self.kind_of]
         extent = np.broadcast_to(np.asarray(half_size, float), 3)
@@ -138,13 +141,19 @@ class LightTable:
         return weight
 
     def le(
-        self, light: Ints, wi: Floats, surface_at: Callable[[Ints], SurfaceInteraction] | None = None
+        self,
+        light: Ints,
+        wi: Floats,
+        surface_at: Callable[[Ints], SurfaceInteraction] | None = None,
+        pdf: Floats | None = None,
     ) -> Floats:
         """Return the radiance (3, n) of the lights numbered `light` (n,) against wi (3, n).
 
         `surface_at` is called with the lanes (k,) whose lights vary, if there are any, and returns the
-        surfaces there.
+        surfaces there. `pdf` (n,) is the density of rays that light samples could replace, inf of others.
         """
+        if pdf is not None and self.texels is not None:
+            return self._le_of_texels(light, wi, surface_at, pdf)
         if self.varies is None:
             return self._le(light, wi, None)
         varies = self.varies.take(light)
@@ -156,6 +165,27 @@ class LightTable:
         if lanes.size:
             assert surface_at is not None
             put(radiance, lanes, self._le(light.take(lanes), take(wi, lanes), surface_at(lanes)))
+        return radiance
+
+    def _le_of_texels(
+        self,
+        light: Ints,
+        wi: Floats,
+        surface_at: Callable[[Ints], SurfaceInteraction] | None,
+        pdf: Floats,
+    ) -> Floats:
+        """Return the same where the last light is known by its texels."""
+        assert self.texels is not None
+        if len(self) == 1:
+            return self.texels.le_of_texels(wi, pdf)
+        far = light == len(self) - 1
+        lanes, others = np.flatnonzero(far), np.flatnonzero(~far)
+        radiance = np.empty_like(wi)
+        put(radiance, lanes, self.texels.le_of_texels(take(wi, lanes), pdf.take(lanes)))
+        found = self.le(
+            light.take(others), take(wi, others), surface_at and (lambda some: surface_at(others.take(some)))
+        )
+        put(radiance, others, found)
         return radiance
 
     def _le(self, light: Ints, wi: Floats, surface: SurfaceInteraction | None) -> Floats:

@@ -212,7 +212,9 @@ def studio(preset: str = DEFAULT, *, up: ArrayLike = "y", camera: Camera | None 
 @lru_cache(maxsize=2)  # one takes 2.7 MB with its tables
 def _environment(preset: str, axes: tuple[tuple[float, ...], ...]) -> Environment:
     pixels, backdrop = PRESETS[preset].pixels(), PRESETS[preset].backdrop()
-    return Environment(pixels.astype(np.float32), transform=axes, backdrop=backdrop.astype(np.float32))
+    light = Environment(pixels.astype(np.float32), transform=axes, backdrop=backdrop.astype(np.float32))
+    light.sample_in_texels()
+    return light
 
 
 def check_lighting(lighting: str | None) -> None:

@@ -19,6 +19,7 @@ from ..compile.program import Passage
 from ..compile.scene import CompiledScene
 from ..guiding import GuideTable
 from ..lights import LightSample, Receiver
+from ..lights.product import bins_of
 from ..sampling.mis import power_heuristic
 from ..sampling.sampler import Dimension, Sampler
 from .interaction import interaction, offset_origin, origin_above
@@ -176,7 +177,10 @@ def emitted(scene: CompiledScene, paths: Paths, hits: Hits) -> Contribution:
         shining = lanes.take(some)
         return interaction(scene, paths.take(shining), hits.take(shining))
 
-    radiance = scene.lights.le(light, paths.direction.take(lanes, 1), surface_at)
+    pdf = None
+    if scene.lights.texels is not None:
+        pdf = np.where(take(paths.specular, lanes), f4(np.inf), take(paths.pdf, lanes))
+    radiance = scene.lights.le(light, paths.direction.take(lanes, 1), surface_at, pdf)
     return Contribution(lanes, radiance, light)
 
 
@@ -206,6 +210,8 @@ def shading(scene: CompiledScene, surface: SurfaceInteraction) -> Shading:
     else:
         wo = frame.to_local(surface.wo)
     receiver = receiver_of(surface, groups) if scene.lights.takes_receiver else None
+    if receiver is not None and scene.lights.texels is not None:
+        receiver.bins = bins_of(receiver)  # once for all samples, and for rays that they could replace
     shade = shading_kind(Shading, scene.program.shading)(
         surface, frame, wo, origin_above(surface), groups, receiver=receiver, materials=scene.materials
     )
