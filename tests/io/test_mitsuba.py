@@ -1164,6 +1164,25 @@ def test_media_on_grids(tmp_path: Path) -> None:
             scene(False, ball=each)
 
 
+def test_null_surfaces_are_those_of_this_package() -> None:
+    assert isinstance(shape("sphere", b={"type": "null"}).material.bsdf, wf.NullSurface)
+
+
+@pytest.mark.filterwarnings("ignore:Mitsuba scene. not honored")
+@pytest.mark.parametrize("inside", [{"type": "twosided"}, {"type": "blendbsdf", "b": {"type": "diffuse"}}])
+def test_null_surfaces_in_other_plugins_are_black(inside: dict[str, Any]) -> None:
+    material = (
+        scene(False, ball={"type": "sphere", "b": {**inside, "a": {"type": "null"}}}).shapes[0].material
+    )
+    assert not material.bsdf.transmissive
+
+
+def test_null_surfaces_that_emit_are_seen() -> None:
+    lamp = {"type": "rectangle", "b": {"type": "null"}, "emitter": {"type": "area"}}
+    assert scene(lamp=lamp).shapes[0].material.opacity is not None
+    assert scene(lamp=lamp).shapes[0].material.opacity.constant > 0
+
+
 # --- What is not honored, and what is wrong -------------------------------------------------------
 
 

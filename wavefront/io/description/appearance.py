@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from ...arrays.vec import Doubles, f4
-from ...bsdfs import Bsdf, Dielectric, Diffuse, Principled, ThinDielectric
+from ...bsdfs import Bsdf, Dielectric, Diffuse, NullSurface, Principled, ThinDielectric
 from ...colors import srgb_to_linear
 from ...materials import Material
 from ...media import Medium
@@ -78,6 +78,11 @@ def _tinted(spec: MaterialSpec, faint: bool) -> tuple[MaterialSpec, bool]:
             material.alpha, material.alpha_cutoff = VertexColors(spec.alpha, channel=3), spec.cutoff
         spec.tinted[faint] = MaterialSpec(material, spec.emission, spec.two_sided)
     return spec.tinted[faint], True
+
+
+def null_surface(name: str | None = None) -> Material:
+    """Return the material of a surface that light passes as if it were not there: the border of a medium."""
+    return Material(NullSurface(), alpha=0.0, name=name)
 
 
 def build_material(

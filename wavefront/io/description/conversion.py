@@ -9,7 +9,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, ClassVar, TypeVar
 
-from ...bsdfs import Diffuse, Measured, NullSurface
+from ...bsdfs import Diffuse, Measured
 from ...core.errors import LimitError, SceneError
 from ...core.plural import plural
 from ...lights import Environment, Light, Sky
@@ -23,6 +23,7 @@ from ..repair import RawMesh
 from ..sources import GRAY as GRAY_PIXEL
 from ..sources import SceneFiles
 from ..spectra import read_spectrum
+from .appearance import null_surface
 from .entity import Entity, Table
 
 MOST_INCLUDED = 15  # files inside each other
@@ -201,7 +202,7 @@ def shown(shapes: list[Shape], lights: Sequence[Light], losses: Losses) -> list[
         return shapes
     if not any(isinstance(each, Environment | Sky) for each in lights):
         raise losses.nothing("has no shapes")
-    return [Sphere((0, 0, 0), 1, material=Material(NullSurface()), name="nothing")]
+    return [Sphere((0, 0, 0), 1, material=null_surface(), name="nothing")]
 
 
 def textures_in(thing: Any, kind: type[T] = BaseTexture) -> list[T]:  # type: ignore[assignment]

@@ -27,6 +27,7 @@ from ...materials import Material
 from ...textures.base import BaseTexture
 from ...textures.image import Texture
 from ...textures.normal_map import BumpMap, NormalMap
+from ..description.appearance import null_surface
 from ..description.computed import computed, product
 from ..description.entity import Entity
 from ..spectra import INDICES, METALS
@@ -34,6 +35,7 @@ from .nodes import plugin, unsupported
 from .textures import as_color, bitmap, color, roughness, scalar
 
 LEAST_INDEX = 1e-6
+BLACK = Diffuse(0)
 BENT = 3e-3  # a little more than the cosine to which such normals are bent
 HALF = "a pane that lets half of the light through"
 MAPPED = "use_shadowing_function flip_invalid_normals"
@@ -123,7 +125,7 @@ def _mask(entity: Entity) -> Material:
     return entity.job.changed(material, alpha=scalar(entity, "opacity", 0.5))
 
 
-plugin("null", "bsdf")(lambda entity: Material(Diffuse(0), alpha=0.0, name=entity.name or None))
+plugin("null", "bsdf")(lambda entity: null_surface(entity.name or None))
 plugin("measured", "bsdf", "filename", note="spectra become RGB under D65")(
     lambda entity: _named(entity, entity.job.measured(entity))
 )
@@ -171,8 +173,14 @@ unsupported("bsdf", "hair measured_polarized")
 
 
 def _inner(entity: Entity) -> Material:
+    """Return the material of a plugin in another, which has its mask."""
     material: Material = entity.job.convert(entity)
-    return material
+    return solid(material, entity.job)
+
+
+def solid(material: Material, job: Any) -> Material:
+    """Return a material that scatters where its mask is not 0: black in place of a null surface."""
+    return job.changed(material, bsdf=BLACK) if material.bsdf.invisible else material
 
 
 def _mapped(entity: Entity, image: Entity, make: Any, channel: Any) -> Material:

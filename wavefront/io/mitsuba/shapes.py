@@ -29,7 +29,7 @@ from ..repair import RawMesh, build, with_corners_apart
 from ..surfaces import as_meshes, ball
 from ..volumes import parsed_grid
 from .attributes import with_attribute
-from .bsdfs import FacingSides, is_one_sided
+from .bsdfs import FacingSides, is_one_sided, solid
 from .media import interior_of
 from .nodes import Job, plugin, unsupported
 from .serialized import read_serialized
@@ -287,6 +287,7 @@ def _appearance(entity: Entity, closed: bool = False, bent: bool = False) -> tup
     interior = interior_of(entity, hollow=material.alpha is not None)
     if emission is not None and material.alpha is not None:
         alpha, emission = _shining(material.alpha, emission)
+        material = solid(material, entity.job)
         material = entity.job.changed(material, alpha=alpha)
     if interior is not None:
         material = entity.job.changed(material, interior=interior)

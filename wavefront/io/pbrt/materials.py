@@ -17,7 +17,6 @@ from ...bsdfs import (
     Diffuse,
     DiffuseTransmission,
     Mix,
-    NullSurface,
     Plastic,
     Principled,
     ThinDielectric,
@@ -29,6 +28,7 @@ from ...media import GridMedium, HenyeyGreenstein, Medium
 from ...textures.base import BaseTexture
 from ...textures.image import Texture
 from ...textures.normal_map import BumpMap, NormalMap
+from ..description.appearance import null_surface
 from ..description.computed import Value, clipped, computed
 from ..description.conversion import GRAY
 from ..description.entity import Entity
@@ -210,7 +210,7 @@ def _mix(entity: Entity) -> Mix:
     return Mix(first.bsdf, second.bsdf, scalar(entity, "amount", 0.5))
 
 
-converts("material", "interface none")(lambda entity: Material(NullSurface(), name=entity.name or None))
+converts("material", "interface none")(lambda entity: null_surface(entity.name or None))
 
 
 @_surface("hair")
