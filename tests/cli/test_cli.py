@@ -146,7 +146,7 @@ def test_a_scene_without_light_is_lit_without_a_warning(tmp_path, fast, capsys):
     out = capsys.readouterr().out
     assert "camera: none; render frames the scene, view='three_quarter'" in out
     assert "light: none; render adds lighting='studio' and a ground" in out
-    assert "up: y, the default; --up changes it" in out
+    assert "up: y (assumed; up='z' turns it)" in out
 
 
 def test_lighting_and_ground_are_handed_on(tmp_path, fast, capsys):

@@ -136,6 +136,25 @@ def test_the_tone_is_chosen_with_the_light() -> None:
     np.testing.assert_array_equal(named.to_uint8(), named.to_uint8(tone="none"))
 
 
+@pytest.mark.parametrize("normal", [(0, 1, 0), (1, 0, 0), (0, 0, 1), (0.6, -0.8, 0.1)])
+def test_the_broad_side_of_flat_things_faces_the_camera(normal) -> None:
+    """At 40 degrees from its normal at most, and level things from above; a cube is seen as ever."""
+    plate = wf.Disk((0, 0, 0), normal, 1.0)
+    cosine = wf.Scene([plate]).framing_camera(direction=wf.Scene([plate]).chosen_view()).rotation[:, 2]
+    assert abs(cosine @ np.array(normal)) / np.linalg.norm(normal) > 0.76
+    assert cosine[1] > 0
+    assert wf.Scene([cube()]).chosen_view() == "three_quarter"
+
+
+def test_a_small_subject_is_told(monkeypatch, capsys) -> None:
+    monkeypatch.setattr("wavefront.drive.hints.NOTICED", 0.0)
+    far = wf.Camera.look_at((0, 1, 30), (0, 0, 0))
+    wf.render(cube(), **{**CHOSEN, "progress": True}, camera=far)
+    assert "hint: the subject fills 1% of the picture" in capsys.readouterr().err
+    wf.render(cube(), **{**CHOSEN, "progress": True})
+    assert "the subject fills" not in capsys.readouterr().err
+
+
 def test_the_tone_is_kept_in_files(tmp_path) -> None:
     chosen = wf.render(cube(), **CHOSEN)
     chosen.save(tmp_path / "a.exr")

@@ -29,6 +29,7 @@ from ..textures.image import Texture
 from .command import SCENE_FILE, add_command
 from .options import add_reading, reading
 
+UNSAID_UP = (".obj", ".ply", ".off")  # formats that do not say what is up
 _PACKAGE = BaseTexture.__module__.partition(".")[0] + "."
 
 
@@ -87,13 +88,13 @@ def _lines(path: str, scene: Scene) -> Iterator[str]:
     yield f"size: file {_bytes(os.path.getsize(path))}, meshes {_bytes(_mesh_bytes(meshes))} in memory"
     yield f"bounds: {_triple(low)} to {_triple(high)}, {_triple(high - low)} across"
     camera, lit = scene.camera is not None, scene.emits
-    yield f"up: {_axis(scene)}"
+    yield f"up: {_axis(path, scene)}"
     yield f"camera: {'in the file' if camera else f'none; render frames the scene, view={FRAMING_VIEW!r}'}"
     if scene.settings:
         told = (f"{name} {value}" for name, value in scene.settings.items())
         yield f"settings: {', '.join(told)}"
     if not lit:
-        yield f"light: none; render adds lighting={DEFAULT!r}{'' if camera else ' and a ground'}"
+        yield f"light: none; render adds lighting={DEFAULT!r} and a ground"
     if not isinstance(scene.camera, Sensors):
         yield f"picture: ends {Settings(**scene.settings).ending(not lit).end or 'as the settings say'}"
     yield "shapes:"
@@ -156,8 +157,10 @@ def _bytes(count: int) -> str:
     return f"{size:.4g} {unit}"
 
 
-def _axis(scene: Scene) -> str:
+def _axis(path: str, scene: Scene) -> str:
     """Return what is up, and who says so."""
+    if scene.up is None and os.path.splitext(path)[1].lower() in UNSAID_UP:
+        return "y (assumed; up='z' turns it)"
     axis = "xyz"[int(scene.vertical().argmax())]
     return f"{axis}, {'the default' if scene.up is None else 'by the file or its format'}; --up changes it"
 

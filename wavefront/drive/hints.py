@@ -20,6 +20,7 @@ from ..shapes import Instance
 from .prepared_scene import PreparedScene
 
 LONG = 10.0  # seconds of a render, from which on hints are shown
+LITTLE_FILLED = 0.15  # of a picture, by its subject
 NOTICED = 2.0  # likewise, what was done without being asked
 # Solid angle of a lamp at a specular surface, sr; from about 0.015 on, light tracing saves a third at most
 SMALL = 0.01
@@ -46,6 +47,9 @@ NO_EMBREE = (
 CLEAN_NOW = 'the picture is denoised, from {} samples per pixel; quality="reference" takes 100, and does not'
 LITTLE_NOW = (
     'the picture ended after {} samples per pixel, at an error of {:.1%}; quality="reference" takes 100'
+)
+SMALL_SUBJECT = (
+    "the subject fills {:.0%} of the picture: view=..., fov=... or another size= frame it more closely"
 )
 NO_DENOISER = (
     "Open Image Denoise is not installed: with `pip install pyoidn` denoise=True is faster and removes more "
@@ -129,6 +133,9 @@ class Hints:
             sys.stderr.flush()
 
     def _ending(self, image: Image) -> Iterator[str]:
+        prepared = self._prepared
+        if prepared.light_is_chosen and prepared.subject_part < LITTLE_FILLED:
+            yield SMALL_SUBJECT.format(prepared.subject_part)
         if self._settings.quick:
             yield CLEAN_NOW.format(image.spp)
         elif self._settings.by_itself and image.spp < DEFAULT_SPP:

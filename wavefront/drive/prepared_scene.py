@@ -5,12 +5,13 @@ from __future__ import annotations
 from collections.abc import Sequence
 from copy import copy
 from dataclasses import fields, replace
+from functools import cached_property
 from typing import Any
 
 import numpy as np
 
 from ..accel import Accelerator, Geometry, InstanceAccelerator, most_copies
-from ..aovs.geometric import ShapeTable
+from ..aovs.geometric import ShapeTable, geometric_aovs
 from ..arrays.vec import luminance
 from ..camera import Camera
 from ..codecs.tone import CHOSEN_TONE
@@ -63,7 +64,7 @@ class PreparedScene:
     """
 
     def __init__(self, scene: Scene, settings: Settings, camera: Camera, framed: Camera | None) -> None:
-        self.scene, self._geometries = scene, list[Geometry]()
+        self.scene, self._camera, self._geometries = scene, camera, list[Geometry]()
         self._fingerprint: str | None = None
         self._light(settings, camera, framed)
         if settings.values["integrator"] == "naive":
@@ -106,6 +107,13 @@ class PreparedScene:
             caustics=values["caustics"],
             asked={"background": settings.background_color, "features": values["features"]},
         )
+
+    @cached_property
+    def subject_part(self) -> float:
+        """Part of the picture that the shapes of the user's scene fill, by rays through 32 × 32 points."""
+        layers = geometric_aovs(self.compiled, self._camera.replace(size=32), self.shapes, ("shape_id",))
+        ids = layers["shape_id"]
+        return float(((ids >= 0) & (ids < len(self.scene.shapes))).mean())
 
     def fingerprint(self) -> str:
         """Return the fingerprint of all that rays can meet.

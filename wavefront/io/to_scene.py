@@ -16,7 +16,7 @@ from ..core.errors import SceneError
 from ..core.progress import Progress
 from ..lights import Light
 from ..materials import Material, MaterialLike, as_material
-from ..scene.scene import AUTO, FRAMING_FOV, FRAMING_VIEW, Scene, importer, register_importer
+from ..scene.scene import AUTO, FRAMING_FOV, Scene, importer, register_importer
 from ..shapes import Instance, Mesh, Shape
 from ..shapes.scalars import Coloring, with_scalars
 
@@ -168,7 +168,7 @@ def choose_camera(
         return camera if size is None else camera.resized(size), False
     if size is None:
         size = SIZE if scene.camera is None else scene.camera.size
-    view, fov = FRAMING_VIEW if view is None else view, FRAMING_FOV if fov is None else fov
+    view, fov = scene.chosen_view(up) if view is None else view, FRAMING_FOV if fov is None else fov
     return scene.framing_camera(fov, size, up=up, direction=view, turning=turning), True
 
 

@@ -40,6 +40,8 @@ VIEWS = {
 }
 VIEW_NAMES = {"isometric": "iso", "side": "right"}  # other names of views
 FRAMING_VIEW = "three_quarter"
+FLAT = 0.15  # of things: thickness relative to their second largest extent
+BROAD = 0.766  # cosine, of 40°, between the view of a flat thing and the normal of its broad side, at least
 MIN_DISTANCE = 1e-2  # of a framing camera from the center, in radii of the scene
 
 
@@ -290,6 +292,24 @@ class Scene(Answers):
         beside, distance = middle + axes[:, 0] * x + axes[:, 1] * y, max(z, MIN_DISTANCE * reach)
         return Camera.look_at(beside + axes[:, 2] * distance, beside, axes[:, 1], fov, size=size)
 
+    def chosen_view(self, up: ArrayLike = AUTO) -> Doubles | str:
+        """Return the view of a camera that frames the scene where none is given: a name, or a direction (3,).
+
+        It is "three_quarter", turned towards the broad side of a flat scene, from above if that is level.
+        """
+        framed = [shape for shape in self.shapes if shape.framed]
+        if framed and len(framed) < len(self.shapes):
+            return Scene(framed, up=self.up).chosen_view(up)
+        turn = turned_up(self.vertical(up))
+        view, normal = turn @ view_direction("view", FRAMING_VIEW), _flat_normal(self._hull()[0])
+        if normal is None or abs(view @ normal) >= BROAD:
+            return FRAMING_VIEW
+        height = normal @ turn[:, 1]
+        normal = normal * np.sign(height if abs(height) > 0.2 else view @ normal or 1.0)
+        beside = view - (view @ normal) * normal
+        beside /= np.linalg.norm(beside)
+        return np.asarray(BROAD * normal + np.sqrt(1 - BROAD * BROAD) * beside)
+
     def _hull(self) -> Balls:
         """Return balls whose convex hull holds all shapes."""
         found = [shape.hull() for shape in self.shapes if not isinstance(shape, Instance)]
@@ -298,6 +318,18 @@ class Scene(Answers):
         return np.concatenate([centers for centers, _ in found]), np.concatenate(
             [radii for _, radii in found]
         )
+
+
+def _flat_normal(points: Doubles) -> Doubles | None:
+    """Return the unit normal (3,) of the broad side of points (n, 3); None where they are not flat."""
+    middle = points - points.mean(0)
+    size = float(np.abs(middle).max())
+    if not size > 0 or len(points) < 3:
+        return None
+    _, axes = np.linalg.eigh((middle / size).T @ (middle / size))
+    thin, other, _ = np.sort(np.ptp(middle @ axes, axis=0))
+    normal = np.round(axes[:, 0], 6)  # the same on all processors
+    return normal / np.sqrt((normal * normal).sum()) if thin < FLAT * other else None
 
 
 def view_direction(name: str, view: ArrayLike) -> Doubles:
