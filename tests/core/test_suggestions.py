@@ -47,6 +47,12 @@ def test_unknown_keywords(call, function: str, name: str, known: str | None) -> 
     assert str(caught.value) == f"{function}() got an unexpected keyword argument {name!r}{hint}"
 
 
+def test_keywords_are_looked_at_after_an_error_alone(calls_of) -> None:
+    calls = calls_of("wavefront.core.suggestions.unknown_keyword")
+    wf.Sphere((0, 0, 0), radius=1)
+    assert not calls
+
+
 def test_other_errors_of_types_are_left_as_they_are() -> None:
     with pytest.raises(TypeError, match="missing 1 required positional argument: 'radius'"):
         wf.Sphere((0, 0, 0))

@@ -443,3 +443,11 @@ def test_a_line_says_that_something_is_tried_only_while_it_is(calls_of: Any, mon
     for side, said in ((63, 0), (64, 1)):
         wf.render(scenes.cornell_box(), 1, size=(side, side), executor="threads")
         assert len(calls) == said
+
+
+def test_a_render_checks_its_scene_and_counts_bytes_once(calls_of: Any) -> None:
+    scene = everything()
+    checks, counts = calls_of("wavefront.scene.Scene.check"), calls_of("wavefront.drive.plan.bytes_per_pixel")
+    plan._bytes_of_sums.cache_clear()
+    wf.render(scene, 1, size=(4, 4), lighting=None, **QUIET)
+    assert (len(checks), len(counts)) == (1, 1)

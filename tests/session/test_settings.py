@@ -101,8 +101,13 @@ def test_settings_are_kept_as_they_are_checked() -> None:
     assert Settings(seconds=1).max_spp > 2**16
 
 
-def test_defaults_are_kept_without_a_check() -> None:
-    """Each is what its check would return, and the samplers are made of those that were given."""
+def test_only_what_is_given_is_checked(calls_of: Any) -> None:
+    calls = calls_of("wavefront.settings.declaration.Setting.checked")
+    Settings(seed=3, spp=None, filter="box")
+    assert [call.args[1] for call in calls] == ["seed"]
+
+
+def test_defaults_are_what_their_checks_would_return() -> None:
     for name, each in SETTINGS.items():
         assert each.checked(name, each.default) == each.default
     assert Settings().values == {name: each.default for name, each in SETTINGS.items()}
