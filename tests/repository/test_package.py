@@ -17,7 +17,13 @@ from wavefront.version import VERSION
 ROOT = Path(__file__).parents[2]
 PUBLIC = {name: getattr(wf, name) for name in wf.__all__}
 LIBRARIES = ("trimesh", "imageio", "PIL", "OpenEXR", "scipy", "embreex", "matplotlib", "tqdm", "numpy.ma")
-LAZY = (*LIBRARIES, "wavefront.io.load", "wavefront.image.comparison", "wavefront.testing")
+LAZY = (
+    *LIBRARIES,
+    "wavefront.io.load",
+    "wavefront.image.comparison",
+    "wavefront.testing",
+    "wavefront.workers.remote",
+)
 
 
 def public_methods():

@@ -418,6 +418,17 @@ def test_larger_pictures_have_workers(monkeypatch: pytest.MonkeyPatch) -> None:
     assert all(threads == before for threads, _ in found)
 
 
+def test_a_larger_view_gets_workers_and_a_smaller_one_none(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(plan, "SMALL_WAVE", 16 * 12 * 4)
+    ball = wf.Sphere((0, 0, 0), 1, material=wf.Diffuse(0.5))
+    settings: dict[str, Any] = {"branches": 1, "size": (16, 12), **QUIET}
+    with wf.Session([ball, wf.Environment(1)], 4, **settings) as session:
+        for size, workers in (((16, 12), 0), ((17, 12), 1), ((16, 12), 0)):
+            session.set_camera(None, size)
+            assert session.run().rgb.shape == (size[1], size[0], 3)
+            assert len(worker_threads()) == workers
+
+
 def test_the_caller_shows_progress_and_can_stop_within_a_wave(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(inline, "POLL_INTERVAL", 0.0)
     monkeypatch.setattr("wavefront.core.progress.TICK", 0.0)
