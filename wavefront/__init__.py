@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Any
 from .accel import Accelerator, Geometry, Intersections
 from .arrays import elementary, vec
 from .arrays.frame import Frame
+from .arrays.state import Hits, Paths, SurfaceInteraction
 from .bsdfs import (
     Bsdf,
     BsdfSample,
@@ -124,6 +125,10 @@ if TYPE_CHECKING:
     )
     from .viewer import Viewer, view
     from .views import render_many, turntable
+    from .watching.explain import explain
+    from .watching.path import LightFound, PathVertices, Vertex
+    from .watching.step import Step
+    from .watching.trace import Trace, trace
 
 __version__ = VERSION
 register_preview(ball_png)
@@ -154,6 +159,10 @@ _LATER = {  # what many programs do without is imported when they ask for it
     ),
     ".testing": ("testing",),
     ".viewer": ("Viewer", "view"),
+    ".watching.explain": ("explain",),
+    ".watching.path": ("PathVertices", "Vertex", "LightFound"),
+    ".watching.step": ("Step",),
+    ".watching.trace": ("Trace", "trace"),
     ".views": ("render_many", "turntable"),
 }
 
@@ -190,6 +199,7 @@ __all__ = [
     "Group",
     "HeightField",
     "HenyeyGreenstein",
+    "Hits",
     "IESLight",
     "Image",
     "InfiniteLight",
@@ -198,6 +208,7 @@ __all__ = [
     "Intersections",
     "Isotropic",
     "Light",
+    "LightFound",
     "LightRecord",
     "LightSample",
     "LightSampler",
@@ -214,6 +225,8 @@ __all__ = [
     "NullSurface",
     "OpenPBR",
     "OrenNayar",
+    "PathVertices",
+    "Paths",
     "PhaseFunction",
     "PhaseMix",
     "Plane",
@@ -241,10 +254,14 @@ __all__ = [
     "Sphere",
     "Spheres",
     "SpotLight",
+    "Step",
+    "SurfaceInteraction",
     "TentFilter",
     "Texture",
     "ThinDielectric",
     "ThinDisney",
+    "Trace",
+    "Vertex",
     "VertexColors",
     "Viewer",
     "Weather",
@@ -253,6 +270,7 @@ __all__ = [
     "compare",
     "daylight_coefficients",
     "elementary",
+    "explain",
     "exposure",
     "from_mitsuba",
     "from_open3d",
@@ -287,6 +305,7 @@ __all__ = [
     "sun_position",
     "testing",
     "to_photometric",
+    "trace",
     "turntable",
     "vec",
     "view",

@@ -9,6 +9,7 @@ from collections.abc import Sequence
 from dataclasses import field, fields
 from enum import IntEnum
 from functools import cache
+from html import escape
 from typing import Any, Self
 
 import numpy as np
@@ -28,6 +29,20 @@ class BounceDepth(IntEnum):
     CAMERA = 0  # none so far: light that it meets is seen directly
     DIRECT = 1  # the last scattering, and none before: light that it meets is direct
     INDIRECT = 2  # one that is not the last, or several
+
+
+UNITS = {
+    **dict.fromkeys(("origin", "prev_vertex", "point", "error", "t"), "scene units"),
+    **dict.fromkeys(("glow", "radiance"), "W/(sr m²)"),
+    "pdf": "1/sr",
+}
+FIRST = 3  # columns that are shown
+
+
+def _first(values: Any) -> str:
+    """Return the first columns of an array as text."""
+    columns = [np.array2string(column, precision=4) for column in np.moveaxis(values[..., :FIRST], -1, 0)]
+    return ", ".join([*columns, *(["…"] if values.shape[-1] > FIRST else [])])
 
 
 @cache
@@ -53,6 +68,28 @@ class SoA:
         kind: Any = type(self)
         values = (getattr(self, name) for name in _names(kind))
         return int(next(value.shape[-1] for value in values if isinstance(value, np.ndarray)))
+
+    def __repr__(self) -> str:
+        """Return a table of the fields: shape, type, unit, and the first columns."""
+        rows = self._rows()
+        widths = [max((len(row[column]) for row in rows), default=0) for column in range(4)]
+        lines = [
+            "  ".join(
+                [*(cell.ljust(width) for cell, width in zip(row, widths, strict=False)), row[4]]
+            ).rstrip()
+            for row in rows
+        ]
+        return "\n  ".join([f"{type(self).__name__}: {len(self)} columns", *lines])
+
+    def _repr_html_(self) -> str:
+        return f"<pre>{escape(repr(self))}</pre>"
+
+    def _rows(self) -> list[tuple[str, str, str, str, str]]:
+        arrays = [(name, value) for name, value in self._values() if isinstance(value, np.ndarray)]
+        return [
+            (name, str(value.shape), str(value.dtype), UNITS.get(name, ""), _first(value))
+            for name, value in arrays
+        ]
 
     def shared(self) -> list[Any]:
         """Return the values that all elements share; records are only joined where these are the same."""
@@ -113,7 +150,14 @@ class Rays(SoA):
 
 @soa
 class Paths(Rays):
-    """Paths: the current ray, throughput and random-number address of each."""
+    """Paths: the current ray, throughput and random-number address of each.
+
+    Examples
+    --------
+    >>> step = next(wf.trace([wf.Sphere((0, 0, 0), 1), wf.Environment(1)], size=(4, 4)))
+    >>> step.paths.direction.shape, step.paths.throughput[:, 0]
+    ((3, 16), array([1., 1., 1.], dtype=float32))
+    """
 
     slot: Ints  # (n,) column of the radiance buffer
     pixel: Words  # (n,) row-major pixel index: first part of the random-number address
@@ -139,7 +183,14 @@ class Paths(Rays):
 
 @soa
 class Hits(SoA):
-    """The nearest hit of each ray."""
+    """The nearest hit of each ray.
+
+    Examples
+    --------
+    >>> steps = list(wf.trace([wf.Sphere((0, 0, 0), 1), wf.Environment(1)], size=(4, 4)))
+    >>> steps[1].stage, steps[1].hits.t.shape
+    ('intersect', (16,))
+    """
 
     t: Floats  # (n,) distance along the ray, scene units; inf on a miss
     prim: Ints  # (n,) row of the scene's tables, -1 on a miss; the primitive id in scenes without instances
@@ -160,7 +211,14 @@ class Hits(SoA):
 
 @soa
 class SurfaceInteraction(SoA):
-    """The surface geometry at hit points. Normals are on the side that the ray came from."""
+    """The surface geometry at hit points. Normals are on the side that the ray came from.
+
+    Examples
+    --------
+    >>> steps = list(wf.trace([wf.Sphere((0, 0, 0), 1), wf.Environment(1)], size=(4, 4)))
+    >>> steps[3].stage, bool(np.allclose(steps[3].surface.ns, steps[3].surface.point, atol=1e-5))
+    ('shade', True)
+    """
 
     point: Floats  # (3, n) hit point, scene units
     error: Floats  # (n,) bound on the rounding error of `point`, scene units

@@ -12,6 +12,7 @@ from functools import partial
 from typing import Any, Self, Unpack
 
 from ..aovs.boxes import silhouettes
+from ..aovs.geometric import ShapeTable
 from ..arrays.vec import Bools
 from ..camera import Camera, ImageSize, check_camera, image_size
 from ..core.errors import Interrupted, RenderError, SaveError, SceneError, warn_caller
@@ -39,7 +40,7 @@ from .inline import AnyPool, InlineWorker
 from .picture import Picture
 from .plan import budget_of, fits_a_wave, make_plan, with_choice
 from .prepared_scene import PreparedScene
-from .tracing import WaveMonitor, trace_job
+from .tracing import Tracer, WaveMonitor, trace_job
 from .work import Work, doubling, undivided
 
 
@@ -486,6 +487,21 @@ class Session:
     @property
     def _failed(self) -> bool:
         return self._work.failure is not None or self._interrupted
+
+    @property
+    def tracer(self) -> Tracer:
+        """How its jobs are traced."""
+        return self._plan.tracer
+
+    @property
+    def shapes(self) -> ShapeTable:
+        """Names and ids of the shapes of its scene."""
+        return self._scene.shapes
+
+    @property
+    def camera(self) -> Camera:
+        """Of the picture that it renders."""
+        return self._picture.camera
 
     @property
     def _interrupted(self) -> bool:
