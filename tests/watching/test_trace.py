@@ -182,9 +182,8 @@ def test_a_path_is_drawn_in_its_scene():
     path = wf.trace(scene, (12, 12)).path((6, 7))
     shapes = path.shapes(0.02)
     assert [shape.name for shape in shapes] == ["path", "light samples"]
-    image = wf.render(
-        wf.Scene([*scene.shapes, *shapes]), size=(32, 32), aovs="shape_id", spp=1, progress=False
-    )
+    aside = wf.Camera.look_at((7, 4, 7), (0, 0, 0), fov=60, size=(64, 64))
+    image = wf.render(wf.Scene([*scene.shapes, *shapes]), 4, camera=aside, aovs="shape_id", progress=False)
     assert {3, 4} <= set(np.unique(image.shape_id).tolist())
 
 

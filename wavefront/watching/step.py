@@ -22,15 +22,23 @@ class Step:
 
     Its arrays are read-only. Places are in the coordinates of the user's scene.
 
-    Attributes
+    Parameters
     ----------
     stage
         "generate", "intersect", the name of a feature that acted, "compact", "shade", "direct",
         "bounce-sample" or "end".
     bounce
         Number of the surface that the paths have come to, 0 for the first.
+    scene
+        The compiled scene.
     light
         (3, n) radiance so far, a column for each pixel that is traced.
+    paths
+        The paths that are under way.
+    hits
+        What their rays have hit; None where they have not been traced.
+    surface
+        The surfaces that they have come to; None where these are not known.
 
     Examples
     --------
