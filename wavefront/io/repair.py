@@ -74,9 +74,10 @@ def with_corners_apart(raw: RawMesh) -> RawMesh:
     return replace(
         raw,
         vertices=raw.vertices[corners],
-        faces=np.arange(corners.size).reshape(-1, 3),
+        faces=np.arange(corners.size).reshape(raw.faces.shape),
         normals=of_corners(raw.normals),
         uvs=of_corners(raw.uvs),
+        uvs1=of_corners(raw.uvs1),
         colors=of_corners(raw.colors),
     )
 

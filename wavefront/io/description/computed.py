@@ -13,13 +13,20 @@ from ...core.errors import exact
 from ...textures.base import BaseTexture
 from ..losses import Losses
 
+FLIP = np.array([[1.0, 0, 0], [0, -1, 1], [0, 0, 1]])  # converts between v downwards and v upwards
 Value = Any  # a number, a color (3,) or a texture
 
 
 class Computed(BaseTexture):
-    """A function of textures and constants, such as their product."""
+    """A function of textures and constants, such as their product; one of colors may give a number."""
 
-    def __init__(self, function: Callable[..., Any], *parts: Any, limits: tuple[float, ...] = ()) -> None:
+    def __init__(
+        self,
+        function: Callable[..., Any],
+        *parts: Any,
+        limits: tuple[float, ...] = (),
+        scalar: bool = False,
+    ) -> None:
         self.function, self._limits = function, limits
         self.parts = tuple(
             part if isinstance(part, BaseTexture) else np.asarray(part, f4).reshape(-1, 1)  # (1, 1) or (3, 1)
@@ -27,7 +34,7 @@ class Computed(BaseTexture):
         )
         textures = [part for part in parts if isinstance(part, BaseTexture)]
         self.reads = tuple(dict.fromkeys(field for each in textures for field in each.reads))
-        self.scalar = all(
+        self.scalar = scalar or all(
             part.scalar if isinstance(part, BaseTexture) else np.ndim(part) == 0 for part in parts
         )
 

@@ -10,20 +10,19 @@ from typing import Any
 
 import numpy as np
 
-from ...arrays.elementary import log, sin_cos_turns
-from ...arrays.vec import FLOAT32_MAX, Doubles
+from ...arrays.elementary import arctan2, log, sin_cos_turns
+from ...arrays.vec import FLOAT32_MAX, Doubles, f4
 from ...core.errors import LimitError, SceneError, printable
 from ...textures.image import StoredImage, Texture
 from ...textures.normal_map import NormalMap
 from ...textures.parameter import MAX_INDEX
 from ..description.appearance import F0, MaterialSpec, build_material
+from ..description.computed import FLIP, Computed
 from ..description.numbers import SHOWN, floats, shown
 from ..sources import GRAY
-from .anisotropy import Direction, RoughnessAlong
 from .compression import DRACO, MESHOPT
 from .document import OF_CANDELA, Document
 from .nodes import INSTANCING
-from .specular_glossiness import BesideSpecular
 
 WEBP = "EXT_texture_webp"
 WRAPS = {10497: "repeat", 33071: "clamp", 33648: "mirror"}
@@ -32,7 +31,6 @@ IMAGES = 4  # all images of a file may have this many times the pixels of the la
 BESIDE = frozenset(  # extensions that may occur with specular-glossiness; the others exclude it
     ("KHR_materials_pbrSpecularGlossiness", "KHR_materials_emissive_strength", "KHR_texture_transform")
 )
-FLIP = np.array([[1.0, 0, 0], [0, -1, 1], [0, 0, 1]])  # converts between v downwards and v upwards
 
 
 class GltfMaterials:
@@ -248,7 +246,7 @@ class _Reader:
         base = self._texture(group, "diffuseTexture", GRAY, scale=diffuse[:3])
         self._alpha(group, "diffuseTexture", float(diffuse[3]), base)
         color: Any = diffuse[:3] if base is None else base
-        self._wanted["base_color"] = color if varying is None else BesideSpecular(color, varying)
+        self._wanted["base_color"] = color if varying is None else Computed(beside_specular, color, varying)
         self._wanted["specular_color"] = specular / F0
         self._wanted["roughness"] = 1 - glossiness
         if varying is not None:
@@ -323,9 +321,11 @@ class _Reader:
         vectors = self._texture(group, "anisotropyTexture", srgb=False)
         across = self._wanted["roughness"]
         self._wanted["roughness_v"] = across
-        self._wanted["rotation"] = float(degrees) if vectors is None else Direction(vectors, degrees)
+        self._wanted["rotation"] = (
+            float(degrees) if vectors is None else Computed(direction, vectors, degrees, scalar=True)
+        )
         if isinstance(across, Texture) or isinstance(strength, Texture):
-            self._wanted["roughness"] = RoughnessAlong(across, strength)
+            self._wanted["roughness"] = Computed(roughness_along, across, strength)
         else:
             self._wanted["roughness"] = float(np.sqrt(across**2 + (1 - across**2) * strength**2))
 
@@ -389,6 +389,24 @@ class _Reader:
         if texture is None and "emissiveTexture" in self._item:  # most such images are dark
             return None
         return factor if texture is None else texture
+
+
+def beside_specular(diffuse: Any, specular: Any) -> Any:
+    """Return diffuse · (1 − max(specular)), by KHR_materials_pbrSpecularGlossiness."""
+    red, green, blue = specular
+    return (f4(1) - np.maximum(np.maximum(red, green), blue)) * diffuse
+
+
+def roughness_along(across: Any, strength: Any) -> Any:
+    """Return the roughness along the tangent: α is mix(across, 1, strength²), and roughness its root."""
+    alpha = across * across
+    return np.sqrt(alpha + (f4(1) - alpha) * strength * strength)
+
+
+def direction(vectors: Any, degrees: Any) -> Any:
+    """Return the rotation of the vector in red and green, and a further one, in degrees."""
+    red, green, _ = vectors
+    return arctan2(f4(2) * green - f4(1), f4(2) * red - f4(1)) * f4(180 / np.pi) + degrees
 
 
 # extensions of metallic-roughness, in the order in which they are read

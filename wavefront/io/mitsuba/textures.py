@@ -12,15 +12,14 @@ from typing import Any, Literal, NamedTuple, TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
-from ...arrays.state import SurfaceInteraction
-from ...arrays.vec import Doubles, Floats, luminance
+from ...arrays.vec import Doubles, luminance
 from ...colors import srgb_to_linear
 from ...colors.spectrum import blackbody_spectrum, spectrum_rgb, uniform_emission
 from ...core.errors import SceneError, as_array, finite_array, in_brief, number
 from ...textures.base import BaseTexture
 from ...textures.image import Texture
 from ...textures.vertex_colors import VertexColors
-from ..description.computed import texture_within
+from ..description.computed import FLIP, Computed, Value, texture_within
 from ..description.entity import Entity
 from ..spectra import pairs_of
 from ..text_lines import numbers
@@ -28,8 +27,6 @@ from .nodes import plugin, unsupported
 from .transforms import plain
 
 MOST_VALUES = 10_000  # of a spectrum in a text
-FLIP = np.array([[1.0, 0, 0], [0, -1, 1], [0, 0, 1]])  # of v
-Value = Any  # a number, a color (3,) or a texture
 Use: TypeAlias = Literal["albedo", "light", "unbounded"]  # of a color: in [0, 1], emission, or neither
 
 
@@ -45,22 +42,9 @@ class Spectrum(NamedTuple):
         return spectrum_rgb(self.pairs, emission=use == "light", bounded=use == "albedo")
 
 
-class SquareRoot(BaseTexture):
-    """The roughness of a texture of α."""
-
-    scalar = True
-
-    def __init__(self, alpha: BaseTexture) -> None:
-        self.alpha, self.reads = alpha, alpha.reads
-
-    def limits(self) -> tuple[float, ...]:
-        """Return the roots of the limits."""
-        return tuple(float(np.sqrt(max(each, 0))) for each in self.alpha.limits())
-
-    def at(self, surface: SurfaceInteraction) -> Floats:
-        """Return the roots, (n,)."""
-        values = self.alpha.at(surface)
-        return np.sqrt(values if values.ndim == 1 else luminance(values))
+def root(alpha: Any) -> Any:
+    """Return the roughness √α of numbers (1, n), or by the luminance of colors (3, n)."""
+    return np.sqrt(alpha if len(alpha) == 1 else luminance(alpha)[None])
 
 
 def color(entity: Entity, name: str, default: Any, use: Use = "albedo") -> Value:
@@ -117,7 +101,8 @@ def roughness(entity: Entity, name: str, default: float) -> Value:
     """Return the roughness √α of a parameter α."""
     alpha = scalar(entity, name, default)
     if isinstance(alpha, BaseTexture):
-        return SquareRoot(alpha)
+        limits = tuple(float(np.sqrt(max(each, 0))) for each in alpha.limits())
+        return Computed(root, alpha, limits=limits, scalar=True)
     return float(np.sqrt(alpha))
 
 

@@ -18,7 +18,7 @@ from ..description.computed import clipped, computed, product
 from ..description.conversion import placed, textures_in
 from ..description.entity import Entity
 from ..description.placing import facing, in_range, moved_raw
-from ..repair import RawMesh, build, existing
+from ..repair import RawMesh, build, existing, with_corners_apart
 from ..surfaces import RINGS, SIDES, over_square
 from ..trimesh.library import import_trimesh
 from .entities import Job, converts, unsupported
@@ -87,7 +87,9 @@ def _bilinear_mesh(entity: Entity) -> RawMesh:
     if (np.abs((np.cross(b - a, c - a) * (d - a)).sum(1)) > 1e-6 * size**3).any():
         entity.lose("the curvature of its patches; two triangles for each")
     if raw.uvs is None:
-        raw = _corners_apart(raw, uvs=np.tile([[0.0, 0], [1, 0], [0, 1], [1, 1]], (len(patches), 1)))
+        raw = replace(
+            with_corners_apart(raw), uvs=np.tile([[0.0, 0], [1, 0], [0, 1], [1, 1]], (len(patches), 1))
+        )
         patches = raw.faces.reshape(-1, 4)
     return replace(raw, faces=patches[:, [0, 1, 3, 0, 3, 2]].reshape(-1, 3))
 
@@ -235,12 +237,12 @@ def _with_coordinates(entity: Entity, raw: RawMesh) -> RawMesh:
     mappings = _mappings(parts)
     if raw.uvs is None and textures_in(parts):
         uvs = np.tile([[0.0, 0], [1, 0], [1, 1]], (len(raw.faces), 1))  # of each triangle, as in pbrt
-        raw = _corners_apart(raw, uvs=uvs)
+        raw = replace(with_corners_apart(raw), uvs=uvs)
     if mappings:
         first, *more = mappings.values()
         if more:
             entity.lose("a second mapping by the place; the first one in its place")
-        raw = _corners_apart(raw, uvs1=first.at_corners(raw.vertices, raw.faces))
+        raw = replace(with_corners_apart(raw), uvs1=first.at_corners(raw.vertices, raw.faces))
     return raw
 
 
@@ -277,13 +279,3 @@ def _mappings(thing: Any) -> dict[Any, Mapping]:
     """Return the mappings by the place of the textures in something."""
     found = (each.mapping for each in textures_in(thing, Mapped))
     return {each.key: each for each in found if each.coordinates is not None}
-
-
-def _corners_apart(raw: RawMesh, **given: Doubles) -> RawMesh:
-    """Return a mesh with a vertex for each corner of its faces, and values given for these."""
-    corners = raw.faces.ravel()
-    apart = replace(raw, faces=np.arange(len(corners)).reshape(raw.faces.shape))
-    for name in ("vertices", "normals", "uvs", "uvs1"):
-        values = getattr(raw, name)
-        setattr(apart, name, None if values is None else values[corners])
-    return replace(apart, **given)  # type: ignore[arg-type]
