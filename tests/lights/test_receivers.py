@@ -40,6 +40,7 @@ from wavefront.lights import (
     TwoSidedTriangleLights,
 )
 from wavefront.lights.ies import Web
+from wavefront.lights.octahedral import OctahedralEnvironment
 
 ORIGIN = np.zeros(3)
 
@@ -61,6 +62,18 @@ def textured() -> dict:
 
 def image() -> LightRecord:
     return recorded(wf.Environment(np.random.default_rng(5).random((5, 8, 3)) ** 3)).compensated()
+
+
+class Texels(OctahedralEnvironment):
+    """As the rays meet it that light samples could replace."""
+
+    def le(self, wi: np.ndarray, surface: object = None) -> np.ndarray:
+        return self.le_of_texels(wi, np.zeros(wi.shape[1], f4))
+
+
+def texels() -> LightRecord:
+    light = recorded(wf.studio()[0]).compensated()
+    return Texels(light.image, light.means, light.product, light.share)
 
 
 def sun() -> LightRecord:
@@ -95,6 +108,7 @@ LIGHTS: dict[type[LightRecord], Callable[[], LightRecord]] = {
         sphere().center, sphere().radius, sphere().radiance, **textured()
     ),
     ImageEnvironment: image,
+    OctahedralEnvironment: texels,
     SkyLight: sky,
     SunLight: sun,
     ConstantEnvironment: lambda: recorded(wf.Environment(1)),
