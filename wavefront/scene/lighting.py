@@ -127,13 +127,13 @@ PRESETS = {
     "studio": Preset(
         # between the shades of albedos 0.03 and 0.2, so that dark and bright things stand out; brighter
         # behind the upper edges of things, which get more light
-        ((-1, 0.055), (-0.35, 0.055), (0.0, 0.07), (0.95, 0.09)),
+        ((-1, 0.052), (-0.35, 0.052), (0.0, 0.066), (0.95, 0.085)),
         (
-            SoftBox(-40, 30, 60, 50, _tinted(3.4, 0.02)),  # key
-            SoftBox(40, 36, 60, 50, _tinted(1.6, -0.03)),  # fill
-            SoftBox(-150, 40, 50, 50, _tinted(0.8, 0.0)),  # rim
-            SoftBox(-108, 33, 46, 44, _tinted(1.5, 0.0)),  # side
-            SoftBox(110, 33, 46, 44, _tinted(1.7, 0.0)),  # other side
+            SoftBox(-46, 36, 56, 48, _tinted(4.5, 0.02)),  # key
+            SoftBox(45, 27, 52, 42, _tinted(0.75, -0.03)),  # fill
+            SoftBox(-150, 40, 50, 50, _tinted(0.9, 0.0)),  # rim
+            SoftBox(-112, 33, 46, 44, _tinted(1.4, 0.0)),  # side
+            SoftBox(112, 35, 46, 44, _tinted(2.0, 0.0)),  # other side
         ),
     ),
     "softbox": Preset(
