@@ -5,7 +5,7 @@ import pytest
 
 import wavefront as wf
 from wavefront.cli import main
-from wavefront.drive.jobs import QUICK_SPP
+from wavefront.drive.jobs import QUICK_SPP, passes_until_clean
 from wavefront.settings.settings import DEFAULT_SPP, LITTLE_NOISE
 
 BALL = wf.Sphere((0, 0, 0), 1)
@@ -158,3 +158,38 @@ def test_a_checkpoint_that_ended_by_itself_goes_on_by_the_same_call_only(tmp_pat
 def test_mistakes_are_named() -> None:
     with pytest.raises(wf.SceneError, match=r"quality.*auto.*reference"):
         render(BALL, quality="best")
+
+
+class FilmWith:
+    """A film whose pixels have given errors, each over the root of the number of samples."""
+
+    def __init__(self, errors, rare=None) -> None:
+        self.errors, self.rare, self.count = np.array(errors), rare, np.zeros(len(errors), int)
+
+    def samples_of(self) -> int:
+        for step in passes_until_clean(self, 100, 0.04):
+            self.samples = step.last
+        return self.samples
+
+    def relative_variance(self, outliers: float) -> np.ndarray:
+        assert outliers == 0
+        return self.errors**2 / self.samples
+
+    def rare_part(self, relative: np.ndarray) -> float | None:
+        return self.rare
+
+
+@pytest.mark.parametrize(
+    ("errors", "rare", "samples"),
+    [
+        ([0.1] * 100, None, 8),  # 3.5 % of 8 samples
+        ([0.1] * 100 + [0.0] * 300, None, 8),  # pixels without noise do not hide it
+        ([0.1] * 99 + [4.0], None, 16),  # one pixel of a heavy tail counts, by its error
+        ([0.1] * 100, 0.9, 64),  # errors that rest on few samples are larger than they look
+        ([0.0] * 100, None, 4),
+        ([100.0] * 100, None, 100),
+    ],
+    ids=str,
+)
+def test_the_mean_error_of_lit_pixels_decides(errors, rare, samples) -> None:
+    assert FilmWith(errors, rare).samples_of() == samples

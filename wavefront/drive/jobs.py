@@ -57,7 +57,6 @@ def passes(
     square_of: Ints,
     begun: Pass | None = None,
     everywhere: bool = False,
-    quick: bool = False,
 ) -> Iterator[Pass]:
     """Yield what is to be done, one pass after the other; each decides by what is on the film then.
 
@@ -87,36 +86,54 @@ def passes(
     everywhere
         Whether each pixel must have an error of `noise` at most, not the picture: a square gets more samples
         while one of its pixels has more.
-    quick
-        Whether decisions begin at `QUICK_SPP`. Then all pixels get equally many samples.
     """
     pixels = np.arange(film.count.size, dtype=np.uint32)
     if noise is None:
         yield Pass(pixels, 0, spp)
         return
-    if film.light is not None or quick:
+    if film.light is not None:
         square_of = np.zeros_like(square_of)
     sizes = np.maximum(np.bincount(square_of), 1)  # a window of a picture may have none of a square
     first = 0
     if begun is not None:
         pixels, first = begun.pixels, begun.first
     while pixels.size and first < spp:
-        last = min(next_stop(first, QUICK_SPP if quick else MIN_SPP), spp)
+        last = min(next_stop(first), spp)
         yield Pass(pixels, first, last)
         first = last
         error = film.relative_variance(0 if everywhere else OUTLIERS)
-        if quick:
-            noisy = error > error.max() * EXACT
-            error = error[noisy] if noisy.any() else error
         # inf where noise**2 would be an error
         limit = noise * noise * _trust(film.rare_part(error))
         if (error.max() if everywhere else error.mean()) <= limit:
             return
-        if quick:
-            continue
         above = np.bincount(square_of, error > limit) > 0
         noisy = above if everywhere else np.bincount(square_of, error) / sizes > limit
         pixels = pixels[noisy[square_of[pixels]]]
+
+
+def passes_until_clean(film: Film, spp: int, limit: float, begun: Pass | None = None) -> Iterator[Pass]:
+    """Yield passes of all pixels, at 4, 6, 8, 12, 16 ... samples, until the picture is clean once denoised.
+
+    It is when the mean error of lit pixels is at most `limit`. All of them count, also those of heavy tails,
+    whose few bright samples a denoiser smears; but each by its error, as eyes see it, not by its square.
+    docs/choices.md has the figures that tell the limit.
+
+    Parameters
+    ----------
+    begun
+        The pass with which a render begins that goes on from a checkpoint.
+    """
+    pixels = np.arange(film.count.size, dtype=np.uint32)
+    first = 0 if begun is None else begun.first
+    while first < spp:
+        last = min(next_stop(first, QUICK_SPP), spp)
+        yield Pass(pixels, first, last)
+        first = last
+        squared = film.relative_variance(0)
+        lit = squared > squared.max() * EXACT
+        trust = _trust(film.rare_part(squared))
+        if not lit.any() or np.sqrt(squared[lit]).mean() <= limit * math.sqrt(trust):
+            return
 
 
 def _trust(rare: float | None) -> float:

@@ -12,7 +12,7 @@ from ..core.interrupt import end_with_parent
 from ..core.progress import Bar
 from ..core.shared import Stopped
 from .inline import AnyPool
-from .jobs import Job, JobResult, Pass, passes, split_jobs, unfinished
+from .jobs import Job, JobResult, Pass, passes, passes_until_clean, split_jobs, unfinished
 from .picture import Picture
 from .tracing import WaveMonitor
 
@@ -88,15 +88,7 @@ class Work:
             with Bar(values["progress"], most, values["seconds"], settings.end) as bar:
                 if picture.samples:  # those of an earlier part of the render
                     bar.advance(picture.samples, picture.scheduler.elapsed)
-                for step in passes(
-                    picture.film,
-                    settings.max_spp,
-                    values["noise"],
-                    picture.view.squares(),
-                    picture.step,
-                    picture.camera.sensor is not None,
-                    settings.quick,
-                ):
+                for step in self._passes():
                     picture.step = step
                     if step.first:
                         yield True
@@ -109,6 +101,15 @@ class Work:
             self.interrupted = True
         except (MemoryError, RenderError) as error:
             self.failure = error
+
+    def _passes(self) -> Iterator[Pass]:
+        """Return what is to be done, one pass after the other."""
+        picture, settings = self._picture, self._picture.plan.settings
+        film, noise = picture.film, settings.values["noise"]
+        if settings.quick and noise is not None:
+            return passes_until_clean(film, settings.max_spp, noise, picture.step)
+        everywhere = picture.camera.sensor is not None
+        return passes(film, settings.max_spp, noise, picture.view.squares(), picture.step, everywhere)
 
     def _sweeps_of(self, step: Pass, split: PassSplitter, bar: Bar) -> Iterator[bool]:
         """Put the samples of a pass on the film; yield at the end of each sweep but the last."""
