@@ -7,10 +7,10 @@ import pytest
 from pictures import with_everything
 
 import wavefront as wf
-from wavefront.codecs.tone import AGX_IN, AGX_OUT, TONES, aces, agx, reinhard
+from wavefront.codecs.tone import AGX_IN, AGX_OUT, TONES, aces, agx, agx_punchy, reinhard
 from wavefront.codecs.white_balance import NEUTRAL, XYZ_OF_RGB, white_balance_matrix
 
-CURVES = {"reinhard": reinhard, "aces": aces, "agx": agx}
+CURVES = {"reinhard": reinhard, "aces": aces, "agx": agx, "agx_punchy": agx_punchy}
 SETTINGS = [
     {},
     {"gamma": "srgb", "tone": "agx"},
@@ -35,7 +35,9 @@ def gray(values):
 
 def test_the_names_of_curves():
     assert set(TONES) == {"none", *CURVES}
-    with pytest.raises(wf.SceneError, match=r"tone is 'filmic'; it must be one of none, reinhard, aces, agx"):
+    with pytest.raises(
+        wf.SceneError, match=r"tone is 'filmic'; it must be one of none, reinhard, aces, agx, agx_punchy"
+    ):
         wf.Image(np.ones((1, 1, 3), np.float32)).to_uint8(tone="filmic")
 
 
@@ -190,3 +192,14 @@ def test_show_in_a_notebook(image, monkeypatch):
     monkeypatch.setitem(sys.modules, "IPython.display", display)
     image.show()
     assert (np.asarray(shown[0]) == image.to_uint8()).all()
+
+
+def test_punchy_is_agx_with_more_contrast_and_color():
+    """By the formula of its look, on codes that the plain curve gives."""
+    rgb = np.array([[[0.6, 0.1, 0.05], [0.18, 0.18, 0.18], [3.0, 2.0, 0.4]]])
+    codes = (agx(rgb) ** (1 / 2.2)) @ np.array(AGX_IN).T
+    steep = codes**1.35
+    luminance = steep @ np.array([0.2126, 0.7152, 0.0722])
+    mixed = luminance[..., None] + 1.4 * (steep - luminance[..., None])
+    expected = np.clip(mixed @ np.array(AGX_OUT).T, 0, 1) ** 2.2
+    np.testing.assert_allclose(agx_punchy(rgb), expected, atol=1e-6)

@@ -122,11 +122,11 @@ def test_dark_and_white_things_stand_out(albedo: float) -> None:
 
 
 def test_the_tone_is_chosen_with_the_light() -> None:
-    """Shown by AgX, a stop brighter, also from a file; light of one's own is shown as it is."""
+    """Shown by AgX, 1.5 stops brighter, also from a file; light of one's own is shown as it is."""
     chosen, own = wf.render(cube(), **CHOSEN), wf.render([cube(), wf.Environment(1)], **CHOSEN)
-    assert (chosen.metadata["tone"], own.metadata["tone"]) == ("agx", "none")
-    by_hand = wf.Image(2 * chosen.rgb).to_uint8(tone="agx")
-    for tone in ("auto", "agx"):
+    assert (chosen.metadata["tone"], own.metadata["tone"]) == ("agx_punchy", "none")
+    by_hand = wf.Image(2**1.5 * chosen.rgb).to_uint8(tone="agx_punchy")
+    for tone in ("auto", "agx_punchy"):
         np.testing.assert_array_equal(chosen.to_uint8(tone=tone), by_hand)
     np.testing.assert_array_equal(chosen.to_uint8(), by_hand)
     assert (chosen.to_uint8(tone="none") != by_hand).any()

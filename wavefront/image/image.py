@@ -742,8 +742,8 @@ class Image(Answers):
             Stops (factors of 2) by which the picture is brightened first.
         tone
             The curve that maps radiance above 1 into the range of a display: "none", "reinhard", "aces" or
-            "agx" (`codecs/tone.py` names their sources). "auto" is "agx" where `render` chose the light, else
-            "none". Light that was chosen is shown one stop brighter by "agx", whose white is far above 1.
+            "agx", "agx_punchy" (`codecs/tone.py` names their sources). "auto" is "agx_punchy" where `render`
+            chose the light, else "none". It shows that light 1.5 stops brighter, as its white is far above 1.
         white_balance
             Color temperature of the light, 1667 to 25000 K, or the linear RGB of a gray object in the
             picture. This color is made neutral after the exposure. 6504 K changes nothing.

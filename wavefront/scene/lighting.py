@@ -127,7 +127,7 @@ PRESETS = {
     "studio": Preset(
         # between the shades of albedos 0.03 and 0.2, so that dark and bright things stand out; brighter
         # behind the upper edges of things, which get more light
-        ((-1, 0.052), (-0.35, 0.052), (0.0, 0.066), (0.95, 0.085)),
+        ((-1, 0.0535), (-0.35, 0.0535), (0.0, 0.068), (0.95, 0.0875)),
         (
             SoftBox(-46, 36, 56, 48, _tinted(4.5, 0.02)),  # key
             SoftBox(45, 27, 52, 42, _tinted(0.75, -0.03)),  # fill
