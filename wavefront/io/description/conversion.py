@@ -116,7 +116,7 @@ class Conversion:
 
     def converted(self, part: Entity) -> Any:
         """Return what becomes of a part, and note which of its parameters do not count."""
-        maker = part.maker
+        maker = self.table.find(part.kind, part.type)
         if maker.convert is None:
             return self.replaced(part)
         part.check()

@@ -11,7 +11,7 @@ import numpy as np
 from ...arrays.vec import Doubles
 from ...core.errors import SceneError, exact, finite_array, in_brief, number, one_of
 from ...core.suggestions import did_you_mean
-from ...shapes.transform import Matrix
+from ...shapes.transform import IDENTITY, Matrix
 from ..losses import Losses
 
 DIGITS = 3  # to which a number by a hair beyond its limit is rounded
@@ -102,13 +102,20 @@ class Entity:
     variant: str = ""  # of its kind, such as that of textures of numbers
     title: str = ""  # what it is, for messages, where the place does not say it
     types: dict[str, str] = field(default_factory=dict)  # of values that are lists, where a format has types
-    matrix: Matrix = field(default_factory=lambda: np.eye(4))  # to the world, where it was stated
+    matrix: Matrix = field(default_factory=lambda: IDENTITY)  # to the world, where it was stated
     state: Any = None  # what else was in force there
     size: int = 1  # entities in it, and itself
     unread: set[str] = field(init=False)  # parameters that have not counted yet
+    maker: Maker | None = field(init=False)  # how it is converted; None for a type that there is not
 
     def __post_init__(self) -> None:
         self.unread = set(self.values)
+        self.retype(self.type)
+
+    def retype(self, type: str) -> None:
+        """Make it one of another type."""
+        self.type = type
+        self.maker = self.job.table.makers.get((self.kind, type))
 
     def __repr__(self) -> str:
         return f"<{self.kind} {self.type!r}>"
@@ -124,19 +131,13 @@ class Entity:
         losses: Losses = self.job.files.losses
         return losses
 
-    @property
-    def maker(self) -> Maker:
-        """How it is converted."""
-        maker: Maker = self.job.table.find(self.kind, self.type)
-        return maker
-
     def lose(self, what: str) -> None:
         """Note something that is not honored."""
         self.lost.note(f"{self.title}: {what}" if self.title else what, self.place)
 
     def report(self) -> None:
         """Note the parameters that have not counted."""
-        for name in [each for each in self.values if each in self.unread]:
+        for name in [each for each in self.values if each in self.unread] if self.unread else ():
             value = self.values[name]
             self.lose(f"{value.kind} {name!r}" if isinstance(value, Entity) else name)
         self.unread.clear()
@@ -144,9 +145,13 @@ class Entity:
     def check(self) -> None:
         """Note the parameters that do not count by the table, where it says which do."""
         maker = self.maker
+        if maker is None:
+            return
         self.unread.difference_update(maker.harmless)
         if maker.reads is not None:
-            self.unread.difference_update(maker.reads, (name for name, each in self._held(maker.holds)))
+            self.unread.difference_update(maker.reads)
+            if self.unread and maker.holds:
+                self.unread.difference_update(name for name, _ in self._held(maker.holds))
             self.report()
 
     def rename(self, old: str, new: str) -> None:
@@ -188,8 +193,8 @@ class Entity:
         SceneError
             If it is of another type, or has no value.
         """
-        maker = self.job.table.makers.get((self.kind, self.type))
-        if maker is not None and maker.reads is not None and name not in maker.reads:
+        reads = None if self.maker is None else self.maker.reads
+        if reads is not None and name not in reads:
             raise KeyError(f"{self.type} does not read {name}")
         self.unread.discard(name)
         if name not in self.types:

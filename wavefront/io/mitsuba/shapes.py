@@ -31,7 +31,7 @@ from ..volumes import parsed_grid
 from .attributes import with_attribute
 from .bsdfs import FacingSides, is_one_sided, solid
 from .media import interior_of
-from .nodes import Job, plugin, unsupported
+from .nodes import TABLE, Job, plugin, unsupported
 from .serialized import read_serialized
 from .textures import upside_down
 from .transforms import to_world
@@ -275,7 +275,11 @@ def _appearance(entity: Entity, closed: bool = False, bent: bool = False) -> tup
     for extra in (*bsdfs[1:], *emitters[1:]):
         entity.lose(f"a second {extra.kind}")
     emission = None
-    if emitters and emitters[0].maker.convert is not None and emitters[0].type != "area":
+    if (
+        emitters
+        and TABLE.find("emitter", emitters[0].type).convert is not None
+        and emitters[0].type != "area"
+    ):
         entity.lose(f"the emitter {emitters[0].type!r}, which is no area light")
     elif emitters:
         emission = entity.job.convert(emitters[0])

@@ -33,7 +33,7 @@ converts, unsupported = TABLE.converts, TABLE.unsupported
 
 def retype(entity: Entity, type: str) -> None:
     """Give an entity a type, which messages name."""
-    entity.type = type
+    entity.retype(type)
     named = f" {entity.name!r}" if entity.name else ""
     entity.title = f"{entity.variant} {entity.kind} {type!r}{named}".lstrip()
 
