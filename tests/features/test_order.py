@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 import wavefront as wf
+from wavefront.accel import make_accelerator
 from wavefront.compile.program import Feature, Program
 from wavefront.features import compiling
 from wavefront.features.absorption import Absorption
@@ -17,6 +18,7 @@ from wavefront.features.alpha import Alpha
 from wavefront.features.background import Backdrop, Background
 from wavefront.features.black_lights import BlackLights
 from wavefront.features.caustics import Caustics
+from wavefront.features.compiling import compile_scene
 from wavefront.features.dispersion import Dispersion
 from wavefront.features.instances import Instances
 from wavefront.features.interpolation import Interpolation, SmoothNormals
@@ -26,7 +28,9 @@ from wavefront.features.normal_maps import NormalMaps
 from wavefront.features.passing import Passing
 from wavefront.features.shadow_catchers import ShadowCatchers
 from wavefront.features.unseen import Unseen
-from wavefront.integrators import training
+from wavefront.integrators import intersect, intersect_and_compact, training
+from wavefront.sampling.sampler import make_sampler
+from wavefront.stages.generate import generate
 
 CAMERA = wf.Camera.look_at((0, 3, 4), (0, 0, 0), fov=40, size=(10, 10))
 WAVES = wf.Texture((np.indices((16, 16)).sum(0) % 5 / 5)[..., None].astype(np.float32), srgb=False, channel=0)
@@ -92,9 +96,7 @@ SCENES: dict[type[Feature], tuple[list[Any], dict[str, Any]]] = {
     Backdrop: ([ball(GRAY), wf.Environment(0.5, backdrop=0.2)], {}),
     Background: ([ball(GRAY), SKY], {"background": (0.9, 0.1, 0.2)}),
 }
-# picture and counts: without it paths are shaded where they would end, and find nothing
-UNSEEN_IN_PICTURES = {BlackLights}
-NEEDED_BY_OTHERS = {Passing}
+SCENES[Passing] = SCENES[Alpha]
 RELIED_ON = {Interpolation, Instances}  # others stop without them
 
 
@@ -103,7 +105,7 @@ def picture(shapes: list[Any], **options: Any) -> Any:
 
 
 def test_each_feature_has_a_scene() -> None:
-    assert {*SCENES, *UNSEEN_IN_PICTURES, *NEEDED_BY_OTHERS} == set(compiling.FEATURES)
+    assert {*SCENES, BlackLights} == set(compiling.FEATURES)
 
 
 @pytest.mark.parametrize("kind", SCENES, ids=lambda kind: kind.__name__)
@@ -117,6 +119,19 @@ def test_the_absence_of_a_feature_is_seen(kind: type[Feature], monkeypatch: pyte
             picture(shapes, **options)
     else:
         assert not np.array_equal(seen, picture(shapes, **options))
+
+
+def test_paths_end_on_black_lights() -> None:
+    """They would find nothing, so no picture shows whether they do."""
+    shapes = [floor(GRAY), wf.Sphere((0, 1, 0), 0.5, material=wf.Diffuse(0.0), emission=3.0)]
+    scene = compile_scene(wf.Scene(shapes), lambda geometry: make_accelerator(geometry, "numpy"))
+    pixel, sampler = np.arange(100, dtype=np.uint32), make_sampler("independent")
+    paths = generate(scene, CAMERA, sampler, pixel, np.zeros(100, np.uint32))
+    on_ball = intersect(scene, paths).prim == 2
+    kept, _ = intersect_and_compact(scene, paths, sampler, 0, np.zeros((3, 100), np.float32), mis=True)
+    assert 5 < on_ball.sum() < 50
+    assert not on_ball[kept.slot].any()
+    assert BlackLights in [type(each) for each in scene.program.features]
 
 
 def swapped(one: type[Feature], other: type[Feature]) -> tuple[type[Feature], ...]:
