@@ -26,6 +26,7 @@ from wavefront.features.media import Glow, Media
 from wavefront.features.nested import Nested
 from wavefront.features.normal_maps import NormalMaps
 from wavefront.features.passing import Passing
+from wavefront.features.receivers import Receivers
 from wavefront.features.shadow_catchers import ShadowCatchers
 from wavefront.features.unseen import Unseen
 from wavefront.integrators import intersect, intersect_and_compact, training
@@ -34,6 +35,7 @@ from wavefront.stages.generate import generate
 
 CAMERA = wf.Camera.look_at((0, 3, 4), (0, 0, 0), fov=40, size=(10, 10))
 WAVES = wf.Texture((np.indices((16, 16)).sum(0) % 5 / 5)[..., None].astype(np.float32), srgb=False, channel=0)
+GRADIENT = np.linspace(0, 1, 8 * 16 * 3).reshape(8, 16, 3)
 SKY, LAMP = wf.Environment(0.5), wf.PointLight((1, 3, 2), 9)
 OPTIONS = {"spp": 4, "max_bounces": 4, "workers": 1, "progress": False, "branches": 1, "reuse": False}
 
@@ -96,6 +98,7 @@ SCENES: dict[type[Feature], tuple[list[Any], dict[str, Any]]] = {
     Backdrop: ([ball(GRAY), wf.Environment(0.5, backdrop=0.2)], {}),
     Background: ([ball(GRAY), SKY], {"background": (0.9, 0.1, 0.2)}),
 }
+SCENES[Receivers] = [ball(wf.Plastic(0.5)), floor(GRAY), wf.Environment(GRADIENT)], {}
 SCENES[Passing] = SCENES[Alpha]
 RELIED_ON = {Interpolation, Instances}  # others stop without them
 

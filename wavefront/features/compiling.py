@@ -23,6 +23,7 @@ from .media import Glow, Media
 from .nested import Nested
 from .normal_maps import NormalMaps
 from .passing import Passing
+from .receivers import Receivers
 from .shadow_catchers import ShadowCatchers
 from .unseen import Unseen
 
@@ -31,6 +32,7 @@ FEATURES: tuple[type[Feature], ...] = (
     Interpolation,
     Instances,
     SmoothNormals,
+    Receivers,
     Alpha,
     Nested,
     Unseen,

@@ -21,7 +21,7 @@ from ..camera import Camera
 from ..compile.scene import CompiledScene
 from ..sampling.warp import cosine_hemisphere, cosine_hemisphere_pdf, uniform_sphere, uniform_sphere_pdf
 from .interaction import POINT_ERROR, origin_above
-from .shade import Shading, receiver_of, shading_kind
+from .shade import Shading, shading_kind
 
 Warp: TypeAlias = Callable[[Floats], Floats]
 UP = column((0, 0, 1))
@@ -126,9 +126,8 @@ def sensor_shading(scene: CompiledScene, paths: Paths) -> Shading:
         back_facing=broadcast(np.False_, n),
     )
     groups: list[tuple[Lanes, Bsdf]] = [(slice(0, n), paths.sensor)]
-    receiver = receiver_of(surface, groups) if scene.lights.takes_receiver else None
     up, kind = np.broadcast_to(UP, normal.shape), shading_kind(SensorShading, scene.program.shading)
-    shade = kind(surface, surface.frame(), up, origin_above(surface), groups, receiver=receiver)
+    shade = kind(surface, surface.frame(), up, origin_above(surface), groups)
     shade.prepare(scene)
     shade.volume = np.arange(n) if paths.sensor.transmissive else None
     shade.crossing = None  # sensors are no boundary of media

@@ -19,7 +19,6 @@ from ..compile.program import Passage
 from ..compile.scene import CompiledScene
 from ..guiding import GuideTable
 from ..lights import LightSample, Receiver
-from ..lights.product import bins_of
 from ..sampling.mis import power_heuristic
 from ..sampling.sampler import Dimension, Sampler
 from .interaction import interaction, offset_origin, origin_above
@@ -209,11 +208,8 @@ def shading(scene: CompiledScene, surface: SurfaceInteraction) -> Shading:
         wo = np.broadcast_to(UP, surface.wo.shape)
     else:
         wo = frame.to_local(surface.wo)
-    receiver = receiver_of(surface, groups) if scene.lights.takes_receiver else None
-    if receiver is not None and scene.lights.texels is not None:
-        receiver.bins = bins_of(receiver)  # once for all samples, and for rays that they could replace
     shade = shading_kind(Shading, scene.program.shading)(
-        surface, frame, wo, origin_above(surface), groups, receiver=receiver, materials=scene.materials
+        surface, frame, wo, origin_above(surface), groups, materials=scene.materials
     )
     shade.prepare(scene)
     return shade
