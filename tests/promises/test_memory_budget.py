@@ -15,20 +15,34 @@ import scenes
 
 import wavefront as wf
 from wavefront.core.memory import memory_size, resident_memory
-from wavefront.drive import plan as budget
+from wavefront.drive import plan
 from wavefront.drive.jobs import LARGE_WAVE, SMALL_WAVE
 from wavefront.drive.plan import (
     LANE_BYTES,
     LEAST_WAVE,
     PROCESS_BYTES,
     THREAD_BYTES,
+    Budget,
     make_budget,
     picture_memory,
 )
 from wavefront.integrators import li_full
+from wavefront.settings import Settings
 
 MEGABYTE = 10**6
 PEAKS = Path(__file__).parents[2] / "benchmarks" / "memory.py"
+
+
+def budget(
+    max_memory: int | None,
+    size: tuple[int, int],
+    workers: int,
+    wave_size: int | None,
+    layers: tuple[str, ...] = (),
+    executor: str = "processes",
+) -> Budget:
+    settings = Settings(max_memory=max_memory, workers=workers, wave_size=wave_size)
+    return make_budget(settings, size, executor, layers)
 
 
 @pytest.mark.parametrize(
@@ -64,20 +78,20 @@ def test_other_sizes_are_refused_before_work(value: Any) -> None:
 @pytest.fixture
 def in_use(monkeypatch: pytest.MonkeyPatch) -> int:
     """Return the bytes that this process has in use."""
-    monkeypatch.setattr(budget, "resident_memory", lambda: 100 * MEGABYTE)
+    monkeypatch.setattr(plan, "resident_memory", lambda: 100 * MEGABYTE)
     return 100 * MEGABYTE
 
 
 def test_memory_sizes_waves_first_and_then_workers(in_use: int) -> None:
     """With much memory waves are as large as pays; with little there are fewer workers, then small waves."""
-    free = make_budget(None, (640, 480), 4, None, processes=True)
+    free = budget(None, (640, 480), 4, None)
     assert (free.workers, free.wave_size) == (4, LARGE_WAVE)
-    ample = make_budget(10**12, (640, 480), 4, None, processes=True)
+    ample = budget(10**12, (640, 480), 4, None)
     assert (ample.workers, ample.wave_size) == (4, SMALL_WAVE)
-    assert make_budget(10**12, (640, 480), 4, 500, processes=True).wave_size == 500
+    assert budget(10**12, (640, 480), 4, 500).wave_size == 500
     before = free
     for megabytes in range(2000, 300, -20):
-        found = make_budget(megabytes * MEGABYTE, (640, 480), 4, None, processes=True)
+        found = budget(megabytes * MEGABYTE, (640, 480), 4, None)
         used = found.workers * (PROCESS_BYTES + found.wave_size * LANE_BYTES)
         assert in_use + picture_memory((640, 480)) + used <= megabytes * MEGABYTE
         assert found.workers <= before.workers
@@ -103,9 +117,7 @@ def test_what_cannot_fit_is_refused_with_the_figures() -> None:
 
 def test_layers_count(in_use: int) -> None:
     limit = in_use + picture_memory((640, 480)) + PROCESS_BYTES + 40 * MEGABYTE
-    plain, layered = (
-        make_budget(limit, (640, 480), 1, None, True, layers) for layers in ((), ("direct", "indirect"))
-    )
+    plain, layered = (budget(limit, (640, 480), 1, None, layers) for layers in ((), ("direct", "indirect")))
     assert layered.wave_size < plain.wave_size
     with pytest.raises(wf.SceneError, match="are needed"):
         wf.render(scenes.everything(), 1, size=(2000, 1500), max_memory="1.1GB", aovs="all", progress=False)
@@ -113,10 +125,10 @@ def test_layers_count(in_use: int) -> None:
 
 def test_the_least_memory_that_is_named_is_enough(in_use: int) -> None:
     least = in_use + picture_memory((64, 64)) + THREAD_BYTES + LEAST_WAVE * LANE_BYTES
-    found = make_budget(least, (64, 64), 8, None, processes=False)
+    found = budget(least, (64, 64), 8, None, executor="threads")
     assert (found.workers, found.wave_size) == (1, LEAST_WAVE)
     with pytest.raises(wf.SceneError, match="are needed"):
-        make_budget(least - 1, (64, 64), 8, None, processes=False)
+        budget(least - 1, (64, 64), 8, None, executor="threads")
 
 
 @pytest.mark.parametrize("executor", ["threads", pytest.param("processes", marks=pytest.mark.slow)])

@@ -72,26 +72,14 @@ class Budget:
 
 
 def make_budget(
-    max_memory: int | None,
-    size: tuple[int, int],
-    workers: int,
-    wave_size: int | None,
-    processes: bool,
-    layers: Sequence[str] = (),
-    light_tracing: bool = False,
+    settings: Settings, size: tuple[int, int], executor: str | ExecutorLike, layers: Sequence[str] = ()
 ) -> Budget:
-    """Return how many workers trace waves of how many lanes.
+    """Return how many workers trace waves of how many lanes: as suits them, or as `max_memory` allows.
 
     Parameters
     ----------
-    max_memory
-        Bytes that this process, with what it uses already, and its workers may use; None for any.
-    size, layers, light_tracing
+    size, layers
         As for `picture_memory`, of a picture for which no memory is in use yet.
-    workers, wave_size
-        The most of each; a `wave_size` of None stands for what suits the workers.
-    processes
-        Whether workers are processes.
 
     Raises
     ------
@@ -99,13 +87,14 @@ def make_budget(
         If the picture needs more memory than is available, or even one worker with a small wave needs more
         than `max_memory`.
     """
-    picture = picture_memory(size, layers, light_tracing)
+    values, workers, wave_size = settings.values, settings.worker_count, settings.values["wave_size"]
+    picture = picture_memory(size, layers, values["caustics"])
     having = f" with {plural(len(layers), 'AOV')}" if layers else ""
     check_memory(f"a picture of {size[0]}x{size[1]} pixels{having}", picture)
-    if max_memory is None:
+    if values["max_memory"] is None:
         return Budget(workers, wave_size or default_wave_size(workers))
-    fixed = PROCESS_BYTES if processes else THREAD_BYTES
-    in_use = resident_memory()
+    max_memory, in_use = int(values["max_memory"]), resident_memory()
+    fixed = THREAD_BYTES if executor == "threads" else PROCESS_BYTES
     worker = fixed + min(LEAST_WAVE, wave_size or LEAST_WAVE) * LANE_BYTES
     left = max_memory - in_use - picture
     if left < worker:
@@ -175,24 +164,8 @@ def make_plan(settings: Settings, scene: PreparedScene, camera: Camera, table: G
         from ..workers.remote import can_be_sent  # here, as forked workers do without
 
         executor = executor if can_be_sent(tracer) else "threads"
-    budget = budget_of(settings, camera.size, executor, tracer.recorded_aovs)
+    budget = make_budget(settings, camera.size, executor, tracer.recorded_aovs)
     return Plan(settings, scene, tracer, executor, budget, fits_a_wave(settings, camera.size, budget))
-
-
-def budget_of(
-    settings: Settings, size: tuple[int, int], executor: str | ExecutorLike, layers: Sequence[str] = ()
-) -> Budget:
-    """Return the workers, and the largest wave, for a picture of a size (width, height) with layers."""
-    values, most = settings.values, settings.values["max_memory"]
-    return make_budget(
-        None if most is None else int(most),
-        size,
-        settings.worker_count,
-        values["wave_size"],
-        executor != "threads",
-        layers,
-        values["caustics"],
-    )
 
 
 def fits_a_wave(settings: Settings, size: tuple[int, int], budget: Budget) -> bool:

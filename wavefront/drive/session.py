@@ -38,7 +38,7 @@ from .final_checks import (
 from .hints import Hints
 from .inline import AnyPool, InlineWorker
 from .picture import Picture
-from .plan import budget_of, fits_a_wave, make_plan, with_choice
+from .plan import fits_a_wave, make_budget, make_plan, with_choice
 from .prepared_scene import PreparedScene
 from .tracing import Tracer, WaveMonitor, trace_job
 from .work import Work, doubling, undivided
@@ -152,7 +152,7 @@ class Session:
             scene, values["camera"], values["size"], values["up"], values["view"], values["fov"]
         )
         # before work, for what takes least; again when the memory of the scene is known
-        budget_of(settings, camera.size, values["executor"] or "threads")
+        make_budget(settings, camera.size, values["executor"] or "threads")
         self._scene = PreparedScene(scene, settings, camera, camera if framed else None)
         if camera.sensor is None:
             settings = self._settings = settings.ending(self._scene.light_is_chosen)
@@ -316,7 +316,7 @@ class Session:
         )
         self._scene.compiled.view(camera)  # checks its distance
         executor = settings.executor_for(camera.size)
-        budget = budget_of(settings, camera.size, executor, self._plan.tracer.recorded_aovs)
+        budget = make_budget(settings, camera.size, executor, self._plan.tracer.recorded_aovs)
         sums = self._plan.sums(camera.size)
         with self.interrupt_handler, self._use:
             self._work.discard()
