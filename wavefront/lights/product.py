@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from functools import cached_property
+
 import numpy as np
 
 from ..arrays.elementary import sin_cos_turns
@@ -52,7 +54,6 @@ class CosineProduct:
         self._cell_row = np.repeat(np.arange(rows), np.diff(self._row_edges))
         self._cell_column = np.repeat(np.arange(columns), np.diff(self._column_edges))
         self._cells = rows, columns
-        self._cell_of: Ints | None = None  # (H·W,) of texels; made where it is used
         mass, middle = self._cell_light(light) if directions is None else self._light_along(light, directions)
         if rotation is not None:
             middle = np.stack([sum(row[k] * middle[k] for k in range(3)) for row in rotation.astype(float)])
@@ -158,11 +159,14 @@ class CosineProduct:
         pdf = density * take(self._light, texel_row * width + texel_column)
         return texel_column, texel_row, x, v, pdf
 
+    @cached_property
+    def _cell_of(self) -> Ints:
+        """The cells of texels, (H·W,); not a part of what is compared, as it is made where it is used."""
+        of = self._cell_row[:, None] * self._cells[1] + self._cell_column
+        return of.ravel().astype(np.int32)  # half the memory
+
     def pdf_of_texels(self, texel: Ints, normal: Ints) -> Floats:
         """Return the density over the unit square, (n,), in texels (n,), for normals (n,)."""
-        if self._cell_of is None:
-            of = self._cell_row[:, None] * self._cells[1] + self._cell_column
-            self._cell_of = of.ravel().astype(np.int32)  # half the memory
         cell = normal * (self._cells[0] * self._cells[1])
         cell += take(self._cell_of, texel)
         return take(self._density, cell) * take(self._light, texel)
