@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import os
 import time
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from copy import deepcopy
 from dataclasses import replace
 from functools import partial
@@ -35,7 +35,6 @@ from ..integrators.light_tracing import Splats
 from ..settings import SETTINGS, Settings
 from ..version import VERSION
 from ..workers.executors import EXECUTORS, waves_per_job
-from .choice import Choice
 from .jobs import CameraJob, Job, JobResult, Pass, Scheduler, WaveResult
 from .plan import PICTURE_BYTES, SPARE_BYTES, Plan
 from .tracing import MonitoredAccelerator, WaveMonitor
@@ -280,20 +279,32 @@ class Picture:
     def identity(self) -> dict[str, Any]:
         """Return what another render must have in common with this one so that its samples are the same.
 
+        These are settings that the picture depends on, how paths go on, and fingerprints. Of an accelerator
+        it is the name: two may differ in the last bit of a distance.
+
         Raises
         ------
         SceneError
             If a part of the scene cannot be compared.
         """
-        plan = self.plan
-        return render_identity(
-            plan.settings,
-            plan.choice,
-            plan.scene.fingerprint(),
-            plan.scene.compiled.accelerator.name,
-            plan.scene.compiled.view(self.camera),
-            plan.tracer.recorded_aovs,
-        )
+        plan, settings = self.plan, self.plan.settings
+        scene, given = plan.scene.fingerprint(), dict[str, Any](settings.values)
+        codes = {
+            CODE + name: fingerprint(f"the {name}", each.choices.find(given[name]))
+            for name, each in SETTINGS.items()
+            if each.identity and each.choices is not None
+        }
+        return {
+            "size": list(self.camera.size),
+            "branches": plan.choice.branches,
+            "reuse": plan.choice.reuse,
+            **settings.labels(),
+            "accelerator": plan.scene.compiled.accelerator.name,
+            "aovs": list(plan.tracer.recorded_aovs),
+            **codes,
+            "camera": fingerprint("the camera", plan.scene.compiled.view(self.camera)),
+            SCENE: scene,
+        }
 
     def checkpoint(self, command: dict[str, Any] | None) -> Checkpoint:
         """Return the render so far, with the command that goes on with it."""
@@ -365,45 +376,6 @@ class BadSamples:
         if self.count > MAX_BAD_SAMPLES * samples:
             raise RenderError(message, image)
         warn_caller(message)
-
-
-def render_identity(
-    settings: Settings, choice: Choice, scene: str, accelerator: str, camera: Camera, layers: Sequence[str]
-) -> dict[str, Any]:
-    """Return what two renders must have in common so that their samples are the same.
-
-    Parameters
-    ----------
-    settings
-        Those that the picture depends on are taken.
-    choice
-        How paths go on, whether that was asked for or decided.
-    scene
-        Its fingerprint.
-    accelerator
-        Its name; two may differ in the last bit of a distance.
-    camera
-        In the unit of the compiled scene.
-    layers
-        The sampled AOVs.
-    """
-    given: Any = settings.values
-    codes = {
-        CODE + name: fingerprint(f"the {name}", each.choices.find(given[name]))
-        for name, each in SETTINGS.items()
-        if each.identity and each.choices is not None
-    }
-    return {
-        "size": list(camera.size),
-        "branches": choice.branches,
-        "reuse": choice.reuse,
-        **settings.labels(),
-        "accelerator": accelerator,
-        "aovs": list(layers),
-        **codes,
-        "camera": fingerprint("the camera", camera),
-        SCENE: scene,
-    }
 
 
 class CheckpointFile:
