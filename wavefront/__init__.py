@@ -125,6 +125,7 @@ if TYPE_CHECKING:
     )
     from .viewer import Viewer, view
     from .views import render_many, turntable
+    from .watching.bounces import bounces
     from .watching.explain import explain
     from .watching.path import LightFound, PathVertices, Vertex
     from .watching.step import Step
@@ -159,6 +160,7 @@ _LATER = {  # what many programs do without is imported when they ask for it
     ),
     ".testing": ("testing",),
     ".viewer": ("Viewer", "view"),
+    ".watching.bounces": ("bounces",),
     ".watching.explain": ("explain",),
     ".watching.path": ("PathVertices", "Vertex", "LightFound"),
     ".watching.step": ("Step",),
@@ -267,6 +269,7 @@ __all__ = [
     "Weather",
     "Year",
     "blackbody",
+    "bounces",
     "compare",
     "daylight_coefficients",
     "elementary",

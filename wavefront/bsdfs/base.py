@@ -12,6 +12,7 @@ from copy import copy
 from typing import Any, ClassVar, Self
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from ..arrays.soa import soa
 from ..arrays.state import SurfaceInteraction
@@ -77,6 +78,30 @@ class Bsdf(Parametrized, ABC):
     def _repr_html_(self) -> str:
         """Show a ball in a notebook."""
         return preview_html(self)
+
+    def plot(self, wo: ArrayLike = (0.6, 0.0, 0.8), axes: Any = None) -> Any:
+        """Draw f, f·|cosθ| and the density with which directions are drawn, for light seen from a direction.
+
+        The curves are polar, in the plane of `wo` and the normal, which points up. Directions below cross the
+        surface. Of f it is the luminance. Delta lobes have no curve.
+
+        Parameters
+        ----------
+        wo
+            (3,) direction to the viewer, in the local frame, whose z is the normal.
+        axes
+            Polar axes of matplotlib; None for new ones, which are returned.
+
+        Raises
+        ------
+        SceneError
+            If `wo` is below the surface, or a parameter is a texture.
+        ImportError
+            If matplotlib is not installed.
+        """
+        from .plot import draw_lobes  # here, as it needs matplotlib
+
+        return draw_lobes(self, wo, axes)
 
     @property
     def view_independent(self) -> bool:

@@ -196,6 +196,10 @@ class Settings:
         samples = self.values["samples"]
         if isinstance(samples, range):
             return self._chosen_samples(samples, most)
+        if self.values["spp"] == 0:
+            raise SceneError(
+                'spp is 0; it must be at least 1 (light without reflections is integrator="direct_mis")'
+            )
         if self.values["spp"] is not None:
             return int(whole_number(1, most)("spp", self.values["spp"]))
         if self.values["seconds"] is not None:
