@@ -16,11 +16,15 @@ import wavefront as wf
 from wavefront.accel import InstanceAccelerator, Intersections, make_accelerator
 from wavefront.accel import instances as queries
 from wavefront.accel.embree import installed
+from wavefront.accel.plate import PlateAccelerator, surely_occluded
 from wavefront.arrays.state import Rays
 from wavefront.arrays.vec import dot
+from wavefront.compile import scene as scene_module
 from wavefront.compile.scene import CompiledScene
 from wavefront.features.compiling import compile_scene
+from wavefront.scene.lighting import lighted
 from wavefront.shapes.instance import can_place, instance_bounds
+from wavefront.shapes.plate import FACES
 from wavefront.stages.interaction import interaction
 from wavefront.stages.intersect import intersect
 from wavefront.stages.normal_mapping import perturb_normals
@@ -108,6 +112,16 @@ def apart(t: np.ndarray, other: np.ndarray) -> np.ndarray:
     return np.abs(np.minimum(t, f4(1e6)) - np.minimum(other, f4(1e6)))
 
 
+def on_ground(shapes: list, plate: bool, monkeypatch) -> CompiledScene:
+    """Shapes on the ground that a render adds, which is met by arithmetic, or in the tree of other meshes."""
+    if not plate:
+        monkeypatch.setattr(scene_module, "beside_plate", lambda make, geometry, _: make(geometry))
+    lit = lighted(wf.Scene(shapes), "studio", ground=True)
+    found = compile_scene(lit, lambda geometry: make_accelerator(geometry, "numpy"))
+    monkeypatch.undo()
+    return found
+
+
 # --- Hits -----------------------------------------------------------------------------------------
 
 
@@ -131,6 +145,35 @@ def test_hits_are_those_of_meshes_of_their_own(accel):
     blocked = shared.accelerator.occluded(origin, direction, distance, nothing(n))
     assert (blocked != (a.t < distance)).sum() <= 2
     assert (blocked != own.accelerator.occluded(origin, direction, distance, nothing(n))).sum() <= 4
+
+
+def test_a_plate_beside_instances_changes_no_hit(monkeypatch):
+    """Mirrored ones among them: the same bits but on the plate, and the same rays are blocked."""
+    n, shapes = 20_000, [*placed(bumpy()), knot()]
+    with_plate, plain = (on_ground(shapes, plate, monkeypatch) for plate in (True, False))
+    first = len(shapes[-1].faces)  # of the plate, after the knot and before instances
+    split, whole = with_plate.accelerator, plain.accelerator
+    assert isinstance(split, InstanceAccelerator)
+    assert isinstance(split._single, PlateAccelerator)
+    assert isinstance(whole, InstanceAccelerator)
+    assert not isinstance(whole._single, PlateAccelerator)
+    origin, direction = rays(n, 7 * f4(with_plate.scale))
+    left = np.random.default_rng(1).integers(-len(plain.normals), len(plain.normals), n)
+    left[(left < 0) | (left >= first) & (left < first + FACES)] = -1
+    a, b = split.closest(origin, direction, left), whole.closest(origin, direction, left)
+    instanced, plate = b.prim >= first + FACES, (b.prim >= first) & (b.prim < first + FACES)
+    assert instanced.sum() > 1000
+    assert plate.sum() > 1000
+    assert same_bits(piece(a, ~plate), piece(b, ~plate))
+    assert (a.prim == b.prim).mean() > 0.999  # but on edges between patches
+    assert apart(a.t, b.t).max() < 1e-4
+    distance = np.random.default_rng(2).uniform(0, 8, n).astype(f4)
+    clear = np.abs(b.t - distance) > 1e-3
+    blocked = split.occluded(origin, direction, distance, left)
+    assert np.array_equal(blocked[clear], whole.occluded(origin, direction, distance, left)[clear])
+    sure, others = surely_occluded(split, origin, direction, distance, left)
+    assert not (sure & plate)[b.t < distance].any()
+    assert np.array_equal(sure | others, blocked)
 
 
 @pytest.mark.parametrize("accel", NAMES)
