@@ -10,7 +10,7 @@ from significance import render
 import wavefront as wf
 from wavefront.cli import main
 from wavefront.denoising import open_image_denoise as module
-from wavefront.denoising.noisy import without_holes
+from wavefront.denoising.noisy import noisy_picture, without_holes
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[2] / "examples"))
 import gltf_scene
@@ -65,6 +65,32 @@ def test_error_and_mean(denoiser) -> None:
     assert image.denoise().metadata["denoiser"] == ("oidn" if "pyoidn" in sys.modules else "nonlocal_means")
 
 
+def test_pixels_without_error_stay(denoiser) -> None:
+    """Bit for bit, and alone; the others have the mean that they had."""
+    image, _ = scene_like()
+    exact = np.zeros((48, 64), bool)
+    exact[:20, 30:], exact[40, 3] = True, True
+    image.rgb[exact] *= np.float32(1.7)
+    image.standard_error[exact] = 0
+    found = image.denoise(denoiser)
+    assert np.array_equal((found.rgb == image.rgb).all(2), exact)
+    assert found.rgb[~exact].mean() == pytest.approx(image.rgb[~exact].mean(), rel=1e-5)
+
+
+def test_what_counts_as_clean() -> None:
+    """Errors that nobody sees, unless they are small by chance; neither blacks nor unknown errors."""
+    rgb, error = np.full((20, 20, 3), 0.5, np.float32), np.full((20, 20, 3), 0.01, np.float32)
+    error[:8], error[12, 12], error[15, 15] = 4e-4, 4e-4, 0
+    rgb[:, :4], error[:, :4] = 0, 0
+    error[0, 10, 1], error[0, 11] = 6e-4, np.nan
+    expected = np.zeros((20, 20), bool)
+    expected[:8, 4:], expected[0, 10:12], expected[15, 15] = True, False, True
+    expected[7, 4] = False  # 4 of 9 agree
+    found = noisy_picture(rgb, error, {}, {}).clean
+    assert np.array_equal(found, expected)
+    assert not noisy_picture(rgb, None, {}, {}).clean.any()
+
+
 def test_guides_help(denoiser) -> None:
     image, exact = scene_like()
     alone = wf.Image(image.rgb, standard_error=image.standard_error).denoise(denoiser)
@@ -112,7 +138,7 @@ def test_noisy_stays(denoiser, tmp_path) -> None:
         noisy = kept.noisy
         assert (noisy.rgb == image.rgb).all()
         assert (noisy.standard_error == image.standard_error).all()
-        assert noisy.metadata == image.metadata
+        assert noisy.metadata == {**image.metadata, "before_denoising": True}
         for name, layer in image.layers.items():
             assert (noisy.layers[name] == layer).all()
             assert (noisy.errors[name] == image.errors[name]).all()

@@ -8,7 +8,7 @@ from typing import TypeAlias
 
 import numpy as np
 
-from ..arrays.vec import Floats
+from ..arrays.vec import Bools, Floats
 from ..core.registry import Registry
 from .noisy import NoisyPicture
 from .nonlocal_means import nonlocal_means
@@ -34,8 +34,9 @@ def is_quick() -> bool:
 def denoise(picture: NoisyPicture, denoiser: str = "auto") -> tuple[Floats, str]:
     """Return the picture without its noise, (H, W, 3), and the name of the denoiser.
 
-    It is scaled so that its mean stays, by 5 % at most: a few very bright pixels, which denoisers remove,
-    may hold more of the mean, and the picture must not become brighter for them.
+    Pixels without error keep their colors, bit for bit. The others are scaled so that the mean stays, by 5 %
+    at most: a few very bright pixels, which denoisers remove, may hold more of the mean, and the picture must
+    not become brighter for them.
 
     Parameters
     ----------
@@ -52,10 +53,11 @@ def denoise(picture: NoisyPicture, denoiser: str = "auto") -> tuple[Floats, str]
     if denoiser == "auto":
         denoiser = "oidn" if is_quick() else "nonlocal_means"
     rgb = DENOISERS.find(denoiser)(picture)
-    return rgb * _scaling(picture.rgb, rgb), denoiser
+    clean = picture.clean[..., None]
+    return np.where(clean, picture.rgb, rgb * _scaling(picture.rgb, rgb, ~clean)), denoiser
 
 
-def _scaling(before: Floats, after: Floats) -> np.float32:
-    """Return the factor by which `after` is multiplied to have the mean of `before`."""
-    mean, wanted = after.mean(dtype=np.float64), before.mean(dtype=np.float64)
-    return np.float32(np.clip(wanted / mean, 1 - MOST_SCALING, 1 + MOST_SCALING) if mean > 0 else 1)
+def _scaling(before: Floats, after: Floats, where: Bools) -> np.float32:
+    """Return the factor that gives pixels `where` (H, W, 1) of `after` their mean in `before`."""
+    total, wanted = (each.sum(where=where, dtype=np.float64) for each in (after, before))
+    return np.float32(np.clip(wanted / total, 1 - MOST_SCALING, 1 + MOST_SCALING) if total > 0 else 1)

@@ -9,8 +9,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..arrays.soa import soa
-from ..arrays.vec import Doubles, Floats
+from ..arrays.vec import Bools, Doubles, Floats
 from ..film.aov_names import GUIDES
+
+UNSEEN = np.float32(1e-3)  # noise relative to the brightest channel: about a tenth of a code of 8 bits
+AGREE = 5  # pixels of 3 × 3: of few samples, the estimated error of a noisy pixel is small by chance
 
 
 @soa
@@ -40,6 +43,25 @@ class NoisyPicture:
     def squared_error(self) -> Floats:
         """Return estimated variances of `rgb`, (H, W, 3)."""
         return _squared_error(self.rgb, self.error)
+
+    @property
+    def clean(self) -> Bools:
+        """Return which pixels (H, W) have no error, or one that nobody sees and most pixels about them too.
+
+        Black ones are not among them: samples that have met no light do not tell whether there is some.
+        """
+        if self.error is None:
+            return np.zeros(self.rgb.shape[:2], np.bool_)
+        brightest, error = _greatest(self.rgb), _greatest(self.error)  # NaN is not small
+        small = (brightest > 0) & (error <= UNSEEN * brightest)
+        wide = np.pad(small, 1, mode="symmetric").astype(np.uint8)
+        rows = wide[:-2] + wide[1:-1] + wide[2:]
+        return small & ((error == 0) | (rows[:, :-2] + rows[:, 1:-1] + rows[:, 2:] >= AGREE))
+
+
+def _greatest(values: Floats) -> Floats:
+    """Return the greatest channel (H, W) of values (H, W, 3)."""
+    return np.maximum(np.maximum(values[..., 0], values[..., 1]), values[..., 2])
 
 
 def noisy_picture(
