@@ -11,8 +11,8 @@ from .camera import Camera
 from .codecs import png_jpeg
 from .core.errors import SceneError
 from .core.fingerprint import fingerprint
+from .drive.render import render
 from .materials import Material
-from .render import render
 from .scene import Scene
 from .shapes import Sphere
 

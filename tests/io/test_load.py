@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 import trimesh
 
+from wavefront import render
 from wavefront.bsdfs.dielectric import Dielectric
 from wavefront.bsdfs.diffuse import Diffuse
 from wavefront.bsdfs.mirror import Mirror
@@ -15,7 +16,6 @@ from wavefront.camera import Camera
 from wavefront.core.errors import SceneError
 from wavefront.io.load import from_trimesh, load, load_mesh, load_meshes
 from wavefront.lights import Environment
-from wavefront.render import render
 from wavefront.scene import Scene
 from wavefront.textures.vertex_colors import VertexColors
 

@@ -22,8 +22,8 @@ from ..camera import Camera
 from ..core.memory import available_memory
 from ..core.plural import plural
 from ..drive import Session
+from ..drive.render import render
 from ..lights import Environment
-from ..render import render
 from ..scene import Scene
 from ..shapes import Mesh, Rectangle, Sphere
 from ..version import VERSION

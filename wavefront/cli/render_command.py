@@ -14,10 +14,10 @@ from ..codecs.display import Display
 from ..codecs.images import check_display, check_writable
 from ..core.errors import SaveError, SceneError
 from ..drive import Session
+from ..drive.render import finish
 from ..film.checkpoint import contents_of, read_header
 from ..image import Image
 from ..io.to_scene import SIZE
-from ..render import finish
 from ..scene.scene import AUTO, FRAMING_FOV, Scene
 from ..viewer import view
 from .command import PICTURE_FILE, SCENE_FILE, add_command

@@ -11,9 +11,9 @@ from numpy.typing import ArrayLike
 from ..camera import Sensors
 from ..core.errors import SceneError
 from ..drive import Session
+from ..drive.render import finish
 from ..film.aov_names import chosen_aovs
 from ..io.to_scene import as_scene
-from ..render import finish
 from ..scene import Scene
 from ..settings import AUTO, RenderSettings, refuse, takes_settings
 from .measurement import Measurement

@@ -6,9 +6,9 @@ from typing import Any
 
 import pyvista
 
+from ..drive.render import render
 from ..image import Image
 from ..io.pyvista.objects import from_pyvista
-from ..render import render
 from ..scene import Scene
 
 

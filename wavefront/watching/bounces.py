@@ -9,7 +9,7 @@ import numpy as np
 from ..arrays.vec import Floats
 from ..core.errors import SceneError, number
 from ..core.suggestions import suggests_keywords
-from ..render import render
+from ..drive.render import render
 
 # for paths that agree in all pictures
 ALONE: dict[str, Any] = {"branches": 1, "reuse": False, "guide": False, "denoise": False}

@@ -5,11 +5,11 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any, Unpack
 
-from .drive import Session
-from .drive.final_checks import interrupted
-from .drive.notebook import run_shown, shows_pictures
-from .image import Image
-from .settings import RenderSettings, takes_settings
+from ..image import Image
+from ..settings import RenderSettings, takes_settings
+from .final_checks import interrupted
+from .notebook import run_shown, shows_pictures
+from .session import Session
 
 
 @takes_settings
