@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 import wavefront as wf
+from wavefront.sampling.sampler import Dimension, numbers_of
 
 
 class CameraFog(wf.Feature):
@@ -95,3 +96,42 @@ def test_what_does_not_go_with_features(other: str) -> None:
 def test_what_is_no_feature() -> None:
     with pytest.raises(wf.SceneError, match=r"features is \[3\]; it must be one or more objects of subcl"):
         wf.render(WALL, features=[3])
+
+
+def test_surfaces_that_only_a_feature_lets_pass() -> None:
+    class Ghost(wf.Feature):
+        """Lets the camera see through what is nearer than two units, by half."""
+
+        camera_only = True
+
+        def passable(self, scene, rays, hits, lanes):
+            return hits.t[lanes] < 2
+
+        def thin(self, opacity, passage):
+            opacity *= np.float32(0.5)
+
+    black = wf.Rectangle((-9, -9, 2.5), (18, 0, 0), (0, 18, 0), material=wf.Diffuse(0.0))
+    scene, options = wf.Scene([black], [wf.Environment(1.0)], CAMERA), {**OPTIONS, "spp": 256}
+    assert wf.render(scene, **options).rgb.max() == 0
+    assert wf.render(scene, features=Ghost(), **options).rgb.mean() == pytest.approx(0.5, abs=0.03)
+
+
+def test_features_have_random_numbers_of_their_own() -> None:
+    class Spots(wf.Feature):
+        """Shows the numbers that it draws."""
+
+        camera_only = True
+
+        def meet(self, leg):
+            at = leg.paths.pixel, leg.paths.sample, leg.bounce
+            leg.emission.radiance = np.stack([leg.sampler.draw_1d(*at, self.dimensions[k]) for k in range(3)])
+
+    numbers = wf.render(
+        wf.Scene([wf.Sphere((0, 0, 99), 0.1)], [wf.Environment(1.0)], CAMERA),
+        features=Spots(),
+        **{**OPTIONS, "spp": 1, "sampler": "independent"},
+    ).rgb
+    assert len(np.unique(numbers)) == numbers.size
+    assert ((numbers >= 0) & (numbers < 1)).all()
+    used = [range(first, numbers_of(first).stop) for first in Dimension if first != Dimension.FEATURE]
+    assert not any(number in Spots.dimensions for each in used for number in (each.start, each.stop - 1))
