@@ -213,8 +213,9 @@ def test_up_follows_the_file_type(tmp_path, capsys, kind: str, up: str) -> None:
     found, named = (wf.render(path, **FAST, **how).rgb for how in ({}, {"up": up}))
     np.testing.assert_array_equal(found, named)
     assert main(["info", path]) == 0
-    who = "by the file or its format" if up == "z" else "the default"
-    assert f"\nup: {up}, {who}; --up changes it\n" in capsys.readouterr().out
+    said = {"stl": "z, by the file or its format; --up changes it", "obj": "y (assumed; up='z' turns it)"}
+    said |= {"3mf": said["stl"], "ply": said["obj"], "glb": "y, the default; --up changes it"}
+    assert f"\nup: {said[kind]}\n" in capsys.readouterr().out
     read = trimesh.load(path)
     first = wf.render([wf.Sphere((0, 0, 0), 0.1), read], **FAST, aovs="normal").layers["normal"]
     again = wf.render([wf.Sphere((0, 0, 0), 0.1), read], **FAST, aovs="normal", up=up).layers["normal"]

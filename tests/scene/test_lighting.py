@@ -144,6 +144,14 @@ def test_the_broad_side_of_flat_things_faces_the_camera(normal) -> None:
     assert abs(cosine @ np.array(normal)) / np.linalg.norm(normal) > 0.76
     assert cosine[1] > 0
     assert wf.Scene([cube()]).chosen_view() == "three_quarter"
+    assert wf.Scene([plate], [wf.PointLight((0, 5, 0), 9)]).chosen_view() == "three_quarter"
+
+
+def test_balls_are_as_thick_as_they_are() -> None:
+    """Not as thin as their centers."""
+    floor, ball = wf.Rectangle((-4, -1, 4), (8, 0, 0), (0, 0, -8)), wf.Sphere((0, 0, 0), 1)
+    assert wf.Scene([floor, ball]).chosen_view() == "three_quarter"
+    assert not isinstance(wf.Scene([floor, wf.Sphere((0, -0.9, 0), 0.1)]).chosen_view(), str)
 
 
 def test_a_small_subject_is_told(monkeypatch, capsys) -> None:

@@ -295,13 +295,16 @@ class Scene(Answers):
     def chosen_view(self, up: ArrayLike = AUTO) -> Doubles | str:
         """Return the view of a camera that frames the scene where none is given: a name, or a direction (3,).
 
-        It is "three_quarter", turned towards the broad side of a flat scene, from above if that is level.
+        It is "three_quarter". Of a flat scene without light of its own it is turned towards the broad side,
+        and from above if that is level.
         """
+        if self.emits:
+            return FRAMING_VIEW
         framed = [shape for shape in self.shapes if shape.framed]
         if framed and len(framed) < len(self.shapes):
             return Scene(framed, up=self.up).chosen_view(up)
         turn = turned_up(self.vertical(up))
-        view, normal = turn @ view_direction("view", FRAMING_VIEW), _flat_normal(self._hull()[0])
+        view, normal = turn @ view_direction("view", FRAMING_VIEW), _flat_normal(*self._hull())
         if normal is None or abs(view @ normal) >= BROAD:
             return FRAMING_VIEW
         height = normal @ turn[:, 1]
@@ -320,14 +323,15 @@ class Scene(Answers):
         )
 
 
-def _flat_normal(points: Doubles) -> Doubles | None:
-    """Return the unit normal (3,) of the broad side of points (n, 3); None where they are not flat."""
+def _flat_normal(points: Doubles, radii: Doubles) -> Doubles | None:
+    """Return the unit normal (3,) of the broad side of balls (n, 3), (n,); None where they are not flat."""
     middle = points - points.mean(0)
     size = float(np.abs(middle).max())
     if not size > 0 or len(points) < 3:
         return None
     _, axes = np.linalg.eigh((middle / size).T @ (middle / size))
-    thin, other, _ = np.sort(np.ptp(middle @ axes, axis=0))
+    along = middle @ axes
+    thin, other, _ = np.sort((along + radii[:, None]).max(0) - (along - radii[:, None]).min(0))
     normal = np.round(axes[:, 0], 6)  # the same on all processors
     return normal / np.sqrt((normal * normal).sum()) if thin < FLAT * other else None
 
