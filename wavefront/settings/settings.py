@@ -21,12 +21,12 @@ from .declaration import SETTINGS, AllSettings
 
 DEFAULT_SPP = 100
 LITTLE_NOISE = 0.02  # at which a picture ends by itself
-CLEAN = 0.045  # likewise, where it is denoised then: mean error of lit pixels
+CLEAN = 0.05  # likewise, where it is denoised then: mean error of lit pixels
 MAX_BRANCH_SAMPLES = 2**32  # a sample's index is 32 bits of its address, and each branch has one
 TRAINING = 0x5EED_0F_9417D  # the seed of a training pass is that of the picture XOR this
 # What happens where nothing says when a picture ends: in metadata, by the bar and by `wavefront info`
 CLEAN_END = (
-    f"once it is clean, at a mean error of {CLEAN:.1%} of lit pixels or {DEFAULT_SPP} samples per pixel, "
+    f"once it is clean, at a mean error of {CLEAN:.0%} of lit pixels or {DEFAULT_SPP} samples per pixel, "
     f'and denoised; quality="reference" takes {DEFAULT_SPP} and does not denoise'
 )
 NOISE_END = (
