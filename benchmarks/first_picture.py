@@ -96,7 +96,7 @@ def noise_left(mesh: Path, size: tuple[int, int], out: Path, options: argparse.N
     spent(code)
     picture = wf.Image.load(out)
     found = flip(picture, converged(mesh, size, options))
-    shadow = wf.render(mesh, 4, size=size, ground="shadow", background="transparent", progress=False)
+    shadow = wf.render(mesh, 16, size=size, ground="shadow", background="transparent", progress=False)
     there = found[shadow.alpha > SHOWN]
     return (
         f"{picture.spp:5d}{found.mean():8.4f}{there.mean():8.4f}{np.percentile(there, 95):8.4f}"
