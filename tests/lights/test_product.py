@@ -15,7 +15,13 @@ from wavefront.accel.numpy_accel import NumpyAccelerator
 from wavefront.arrays.vec import f4
 from wavefront.features.compiling import compile_scene
 from wavefront.lights import EnvironmentSum, LightRecord, Receiver
-from wavefront.lights.product import NO_NORMAL, CosineProduct, octahedral_bins, octahedral_normals
+from wavefront.lights.product import (
+    NO_NORMAL,
+    CosineProduct,
+    TexelProduct,
+    octahedral_bins,
+    octahedral_normals,
+)
 
 SETTINGS: dict = {"max_bounces": 3, "accel": "numpy"}
 NORMALS = [(0, 1, 0), (0, -1, 0), (1, 0, 0), (-0.6, 0.48, 0.64), (0.1, -0.2, -0.97)]
@@ -104,6 +110,20 @@ def test_densities_are_one_over_the_image(shape: tuple[int, int]) -> None:
         assert density.mean(dtype=float) == pytest.approx(1, rel=1e-5)
         assert (density > 0).tolist() == (light.ravel() > 0).tolist()
     assert density == pytest.approx((light / light.mean()).ravel(), rel=1e-4)
+
+
+def test_texels_are_those_of_the_points() -> None:
+    rng, shape, n = np.random.default_rng(2), (24, 40), 20_000
+    light, directions = rng.random(shape, f4) ** 4, rng.normal(size=(3, *shape))
+    directions /= np.linalg.norm(directions, axis=0)
+    u, normal = rng.random((2, n), f4), rng.integers(0, NO_NORMAL + 1, n)
+    points, texels = (kind(light, None, directions, (6, 5)) for kind in (CosineProduct, TexelProduct))
+    x, y, pdf = points.sample(u, normal)
+    texel, x_of_texel, y_of_texel, same_pdf = texels.sample_texels(u, normal)
+    assert np.array_equal(texel, (y * shape[0]).astype(int) * shape[1] + (x * shape[1]).astype(int))
+    assert np.allclose([x_of_texel, y_of_texel], [x, y], atol=1e-5)
+    assert np.array_equal(same_pdf, pdf)
+    assert np.array_equal(texels.pdf_of_texels(texel, normal), pdf)
 
 
 @pytest.mark.parametrize("opaque", [True, False])

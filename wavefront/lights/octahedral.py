@@ -12,7 +12,7 @@ from ..arrays.state import SurfaceInteraction
 from ..arrays.vec import Doubles, Floats, Ints, f4, luminance, positive, take
 from .base import LightSample, Receiver
 from .infinite import InfiniteLight, at_infinity
-from .product import NO_NORMAL, CosineProduct, bins_of
+from .product import NO_NORMAL, TexelProduct, bins_of
 
 if TYPE_CHECKING:
     from .image import ImageEnvironment
@@ -35,7 +35,7 @@ class OctahedralEnvironment(InfiniteLight):
 
     image: ImageEnvironment
     means: Floats  # (3, texels) radiance
-    product: CosineProduct
+    product: TexelProduct
     share: float  # of the light that light samples are to bring
     normals: Ints | None = None  # (n,) what it is drawn for; None for no normal in particular
     takes_receiver: ClassVar[bool] = True
@@ -50,7 +50,7 @@ class OctahedralEnvironment(InfiniteLight):
         if (more * more / even).mean() < least_variance:
             return None
         excess, directions = positive(more), _directions(1)[0].reshape(3, SIDE, SIDE)
-        product = CosineProduct(excess.reshape(SIDE, SIDE).astype(f4), None, directions, CELLS)
+        product = TexelProduct(excess.reshape(SIDE, SIDE).astype(f4), None, directions, CELLS)
         return cls(image, means, product, float(excess.mean()))
 
     def sample_li(self, point: Floats, u: Floats) -> LightSample:

@@ -130,18 +130,6 @@ class CosineProduct:
         column, row, x, v, pdf = self._sample(u, normal)
         return within_cell(column, x, self.shape[1]), within_cell(row, v, self.shape[0]), pdf
 
-    def sample_texels(self, u: Floats, normal: Ints) -> tuple[Ints, Floats, Floats, Floats]:
-        """Return the texels (n,) of such points first; these keep a small distance from edges of texels."""
-        height, width = self.shape
-        column, row, x, y, pdf = self._sample(u, normal)
-        for place, first, size in ((x, column, width), (y, row, height)):
-            np.clip(place, EDGE, f4(1) - EDGE, out=place)
-            place += first
-            place *= f4(1 / size)
-        row *= width
-        row += column
-        return row, x, y, pdf
-
     def _sample(self, u: Floats, normal: Ints) -> tuple[Ints, Ints, Floats, Floats, Floats]:
         """Return columns and rows (n,) of texels, places within them, and the density over the square."""
         (rows, columns), width = self._cells, self.shape[1]
@@ -159,6 +147,56 @@ class CosineProduct:
         pdf = density * take(self._light, texel_row * width + texel_column)
         return texel_column, texel_row, x, v, pdf
 
+    def pdf(self, x: Floats, y: Floats, normal: Ints) -> Floats:
+        """Return the density over the unit square, (n,), at x, y (n,) in [0, 1], for normals (n,)."""
+        (rows, columns), (height, width) = self._cells, self.shape
+        column = np.clip((x * f4(width)).astype(np.intp), 0, width - 1)
+        row = np.clip((y * f4(height)).astype(np.intp), 0, height - 1)
+        cell = (normal * rows + take(self._cell_row, row)) * columns + take(self._cell_column, column)
+        return take(self._density, cell) * take(self._light, row * width + column)
+
+
+class TexelProduct(CosineProduct):
+    """Such a distribution that is asked for texels. Cells have as many rows and columns of these each."""
+
+    def _choose_texels(self, light: Floats) -> None:
+        (rows, columns), (height, width) = self._cells, self.shape
+        number = np.arange(height * width, dtype=np.int32).reshape(rows, height // rows, columns, -1)
+        self._texel_at = number.transpose(0, 2, 1, 3).ravel()  # cell by cell
+        self._light = light.astype(f4, copy=False).ravel()
+        within = self._light.take(self._texel_at).reshape(-1, width // columns)
+        of_row = np.add.reduceat(within, [0], axis=1, dtype=np.float64)
+        self._texel_rows = Inversion(of_row.reshape(rows * columns, -1), 2)
+        self._texel_columns = Inversion(within, 2)
+
+    def sample_texels(self, u: Floats, normal: Ints) -> tuple[Ints, Floats, Floats, Floats]:
+        """Return texels (n,), points x, y (n,) in [0, 1) of the image, and the density over the square.
+
+        Points keep a small distance from edges of texels.
+
+        Parameters
+        ----------
+        u
+            (2, n): u[0] selects x, u[1] selects y.
+        normal
+            (n,) numbers of normals.
+        """
+        height, width = self.shape
+        row, y = self._rows.find(u[1], normal)
+        cell, x = self._columns.find(u[0], row)
+        density = take(self._density, cell)
+        cell -= normal * (self._cells[0] * self._cells[1])
+        row, y = self._texel_rows.find(y, cell)
+        at, x = self._texel_columns.find(x, row)
+        texel = take(self._texel_at, at).astype(np.intp)
+        density *= take(self._light, texel)
+        row = texel // width
+        for place, first, size in ((x, texel - row * width, width), (y, row, height)):
+            np.clip(place, EDGE, f4(1) - EDGE, out=place)
+            place += first
+            place *= f4(1 / size)
+        return texel, x, y, density
+
     @cached_property
     def _cell_of(self) -> Ints:
         """The cells of texels, (H·W,); not a part of what is compared, as it is made where it is used."""
@@ -170,14 +208,6 @@ class CosineProduct:
         cell = normal * (self._cells[0] * self._cells[1])
         cell += take(self._cell_of, texel)
         return take(self._density, cell) * take(self._light, texel)
-
-    def pdf(self, x: Floats, y: Floats, normal: Ints) -> Floats:
-        """Return the density over the unit square, (n,), at x, y (n,) in [0, 1], for normals (n,)."""
-        (rows, columns), (height, width) = self._cells, self.shape
-        column = np.clip((x * f4(width)).astype(np.intp), 0, width - 1)
-        row = np.clip((y * f4(height)).astype(np.intp), 0, height - 1)
-        cell = (normal * rows + take(self._cell_row, row)) * columns + take(self._cell_column, column)
-        return take(self._density, cell) * take(self._light, row * width + column)
 
 
 def octahedral_normals() -> Doubles:

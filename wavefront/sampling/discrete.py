@@ -57,15 +57,15 @@ class Inversion:
         if cells_per_item is None:
             cells_per_item = 8 if weights.size <= _LARGE else 1
         self._cells = 1 << (cells_per_item * self.items - 1).bit_length()
-        edge = np.empty((rows, self.items), f4)
+        edge = np.zeros((rows, self.items + 1), f4)  # where items begin and end
         first = np.empty((rows, self._cells), np.min_scalar_type(self.items - 1))
         step = max(1, _PART // self.items)
         for part in (slice(start, start + step) for start in range(0, rows, step)):
             upto = np.cumsum(weights[part], axis=1, dtype=np.float64)
             upto /= np.where(upto[:, -1:] > 0, upto[:, -1:], 1)
             # A float32 edge that is rounded up separates float32 numbers exactly as the float64 sum does.
-            edge[part] = _rounded_up(upto)
-            first[part] = _first_items(edge[part], self._cells)
+            edge[part, 1:] = _rounded_up(upto)
+            first[part] = _first_items(edge[part, 1:], self._cells)
         self._edge, self._first = edge.ravel(), first.ravel()
 
     def find(self, u: Floats, row: Ints | None = None) -> tuple[Ints, Floats]:
@@ -80,26 +80,32 @@ class Inversion:
         """
         cell = (u * f4(self._cells)).astype(np.intp)
         if row is None:
-            flat = take(self._first, cell).astype(np.intp)
+            at = take(self._first, cell).astype(np.intp)
         else:
-            flat = take(self._first, cell + row * self._cells) + row * self.items
-        short = np.flatnonzero(take(self._edge, flat) <= u)
+            cell += row * self._cells
+            at = take(self._first, cell) + row * (self.items + 1)
+        ends = self._edge[1:]
+        short = np.flatnonzero(take(ends, at) <= u)
         for _ in range(2):  # most lanes end after one or two steps
-            flat[short] += 1
-            short = short[self._edge.take(flat[short]) <= u[short]]
+            further = at[short] + 1
+            at[short] = further
+            short = short[ends.take(further) <= u[short]]
         if len(short):
-            flat[short] = self._searched(flat[short], u[short])
-        before = take(self._edge, flat - 1)  # beyond u, or 0, at the end of another row
-        start = np.where(before > u, f4(0), before)
-        rest = (u - start) / (take(self._edge, flat) - start)
-        return flat, np.minimum(rest, BELOW_ONE)
+            at[short] = self._searched(ends, at[short], u[short])
+        start, length = take(self._edge, at), take(ends, at)
+        length -= start
+        rest = u - start
+        rest /= length
+        if row is not None:
+            at -= row
+        return at, np.minimum(rest, BELOW_ONE, out=rest)
 
-    def _searched(self, low: Ints, u: Floats) -> Ints:
+    def _searched(self, ends: Floats, low: Ints, u: Floats) -> Ints:
         """Return the items (n,) for u (n,) by bisection, from items `low` (n,) of the same rows on."""
-        high = low + (self.items - 1 - low % self.items)
+        high = low + (self.items - 1 - low % (self.items + 1))
         for _ in range(self.items.bit_length()):
             middle = (low + high) // 2
-            beyond = self._edge.take(middle) <= u
+            beyond = ends.take(middle) <= u
             low, high = np.where(beyond, middle + 1, low), np.where(beyond, high, middle)
         return high
 
