@@ -28,6 +28,7 @@ from wavefront.features.normal_maps import NormalMaps
 from wavefront.features.passing import Passing
 from wavefront.features.receivers import Receivers
 from wavefront.features.shadow_catchers import ShadowCatchers
+from wavefront.features.shadow_terminator import ShadowTerminator
 from wavefront.features.unseen import Unseen
 from wavefront.integrators import intersect, intersect_and_compact, training
 from wavefront.sampling.sampler import make_sampler
@@ -74,6 +75,7 @@ SCENES: dict[type[Feature], tuple[list[Any], dict[str, Any]]] = {
     Instances: ([wf.Instance(TRIANGLE, np.eye(4)), wf.Instance(TRIANGLE, TURNED), LAMP], {"accel": "numpy"}),
     Interpolation: ([floor(wf.Diffuse(WAVES)), LAMP], {}),
     SmoothNormals: ([BENT, LAMP], {}),
+    ShadowTerminator: ([BENT, LAMP], {}),
     Alpha: ([floor(GRAY), ball(wf.Material(GRAY, alpha=0.5)), SKY], {}),
     Nested: (
         [

@@ -241,6 +241,8 @@ class SurfaceInteraction(SoA):
     folds: Bools | None = (
         None  # (n,) scattering is folded at the surface (stages/normal_mapping.py), or nowhere
     )
+    # (3, n) from the points to the round surface that normals of vertices stand for; None where none do
+    lift: Floats | None = None
     index_around: Floats | None = None  # (n,) of refraction, outside of the surfaces; None where it is 1
 
     def frame(self) -> Frame:

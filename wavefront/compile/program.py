@@ -33,6 +33,7 @@ class Facts:
     compiled: CompiledScene  # its arrays; its program is empty so far
     materials: Sequence[Material]  # all of the scene, by their numbers
     nonscattering_lights: Bools | None  # (lights,) those whose surface is black; None when there are none
+    corners: Floats  # (m, 3, 3) of the triangles, as they are in the arrays
     has_alpha: Bools  # (m + k + 1,) primitives whose opacity is below 1
     asked: Mapping[str, Any]  # settings, by their names
     given: Sequence[Feature]  # of the user's own

@@ -237,6 +237,7 @@ def gather_scene(
         compiled=compiled,
         materials=user_materials,
         nonscattering_lights=nonscattering_lights,
+        corners=triangles,
         has_alpha=has_alpha,
         asked=asked,
         given=asked.get("features", ()),

@@ -25,6 +25,7 @@ from .normal_maps import NormalMaps
 from .passing import Passing
 from .receivers import Receivers
 from .shadow_catchers import ShadowCatchers
+from .shadow_terminator import ShadowTerminator
 from .unseen import Unseen
 
 # In the order in which they act.
@@ -32,6 +33,7 @@ FEATURES: tuple[type[Feature], ...] = (
     Interpolation,
     Instances,
     SmoothNormals,
+    ShadowTerminator,
     Receivers,
     Alpha,
     Nested,

@@ -10,7 +10,7 @@ from ..arrays.state import Paths
 from ..arrays.vec import Floats, Ints, f4, normalize, signs, take
 from ..bsdfs import BsdfSample, sampled
 from ..sampling.sampler import Dimension, Sampler
-from .interaction import LIFT, offset_origin
+from .interaction import LIFT
 from .shade import Shading
 
 
@@ -63,7 +63,7 @@ def bounce_sample(paths: Paths, shade: Shading, sampler: Sampler, bounce: int) -
         slot=paths.slot,
         pixel=paths.pixel,
         sample=paths.sample,
-        origin=offset_origin(surface, cos_g) if (cos_g < 0).any() else shade.start,
+        origin=shade.origins(cos_g),
         direction=direction,
         exclude_prim=surface.prim,
         throughput=throughput,

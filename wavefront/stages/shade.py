@@ -127,6 +127,10 @@ class Shading:
 
     # --- What features change -------------------------------------------------------------------------
 
+    def origins(self, cos_g: Floats) -> Floats:
+        """Return where rays (3, n) start that leave with cosines (n,) against `ng`."""
+        return offset_origin(self.surface, cos_g) if (cos_g < 0).any() else self.start
+
     def prepare(self, scene: CompiledScene) -> None:
         """Get ready to be shaded."""
 
@@ -279,8 +283,7 @@ def direct(
     f, pdf = shade.evaluate(wi)
     lit = (light.pdf > 0) & (highest(f) * cos != 0)  # NaN stays, so that it reaches the picture
     lanes = np.flatnonzero(lit)
-    through = (lit & (cos_g < 0)).any()
-    origin = offset_origin(shade.surface, cos_g) if through else shade.start
+    origin = shade.origins(cos_g) if (lit & (cos_g < 0)).any() else shade.start
     rays = shadow_rays(shade.surface, origin, light, lanes)
     number = take(number, lanes)
     shade.enter(scene, rays, paths, lanes, number, cos_g, sampler, bounce)

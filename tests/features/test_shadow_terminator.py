@@ -1,0 +1,115 @@
+"""The edge of the shadow on smooth meshes is that of the round surface, and no light gets through them."""
+
+import numpy as np
+import pytest
+import trimesh
+
+import wavefront as wf
+from wavefront.accel.numpy_accel import NumpyAccelerator
+from wavefront.features.compiling import compile_scene
+from wavefront.features.shadow_terminator import ShadowTerminator, heights_of
+
+SUN = wf.DirectionalLight((-1, -0.3, -0.2), 3.0)
+BALL = trimesh.creation.icosphere(2, 1.0)
+CAMERA = wf.Camera.orthographic((0, 0, 5), (0, 0, 0), (0, 1, 0), height=2.2, size=(96, 96))
+FAST = {"spp": 4, "progress": False, "workers": 1, "branches": 1, "reuse": False}
+
+
+def ball(material=None, normals=BALL.vertices):
+    return wf.Mesh(BALL.vertices, BALL.faces, normals=normals, material=material or wf.Diffuse(0.8))
+
+
+def edge(shape, **settings):
+    """Return the column at which each row in the middle begins to be lit."""
+    image = wf.render(wf.Scene([shape], [SUN], CAMERA), **FAST, **settings)
+    return np.array([np.argmax(row) for row in image.rgb[14:80, :, 0] > 0.02])
+
+
+@pytest.mark.parametrize("accel", ["numpy", "embree"])
+def test_the_edge_is_that_of_a_sphere(accel) -> None:
+    if accel == "embree":
+        pytest.importorskip("embreex")
+    assert np.abs(edge(ball(), accel=accel) - edge(wf.Sphere((0, 0, 0), 1))).max() <= 1
+    assert np.abs(edge(ball(normals=None)) - edge(wf.Sphere((0, 0, 0), 1))).max() > 3
+
+
+@pytest.mark.parametrize("mirror", [1, -1])
+def test_instances_have_it_as_meshes_do(mirror) -> None:
+    """Also mirrored and stretched ones, of which the mesh holds the vertices and normals of the result."""
+    matrix = np.diag([mirror * 1.5, 1.0, 0.7, 1.0])
+    placed = BALL.vertices * np.diag(matrix)[:3]
+    faces = BALL.faces if mirror > 0 else BALL.faces[:, ::-1]
+    mesh = wf.Mesh(placed, faces, normals=BALL.vertices / np.diag(matrix)[:3], material=wf.Diffuse(0.8))
+    one, two = (
+        wf.render(wf.Scene(shapes, [SUN], CAMERA), **FAST).rgb[..., 0]
+        for shapes in ([mesh], [wf.Instance(ball(), matrix)])
+    )
+    assert np.abs(one - two).mean() < 1e-3
+    assert ((one > 0.02) != (two > 0.02)).mean() < 2e-3
+
+
+def test_a_white_ball_in_a_white_sky_is_white() -> None:
+    """No light is lost where normals disagree: before, about one in 1 000."""
+    white = ball(wf.Diffuse(1.0))
+    image = wf.render(wf.Scene([white], [wf.Environment(1)], CAMERA), max_bounces=30, **FAST)
+    np.testing.assert_allclose(image.rgb, 1, rtol=1e-5)
+
+
+@pytest.mark.filterwarnings("ignore:the picture is black")
+@pytest.mark.parametrize("thickness", [1.0, 0.02])
+def test_no_light_gets_through(thickness) -> None:
+    """Of a lamp inside of a box, or a thin case, whose normals are as round as can be."""
+    box = trimesh.creation.box((1, thickness, 1))
+    normals = box.vertices / np.abs(box.vertices)
+    case = wf.Mesh(box.vertices, box.faces, normals=normals, material=wf.Diffuse(0.8))
+    lamp = wf.Sphere((0, 0, 0), 0.3 * thickness, emission=50)
+    camera = wf.Camera.look_at((2, 1.5, 3), (0, 0, 0), fov=35, size=(48, 48))
+    far = wf.PointLight((0, 0, -9), 1e-9)
+    for shapes in ([case, lamp], [wf.Instance(case, np.diag([-1.0, 1, 1, 1])), lamp]):
+        image = wf.render(wf.Scene(shapes, [far], camera), **{**FAST, "spp": 16})
+        assert image.rgb.max() < 1e-6
+
+
+def compiled(shape):
+    return compile_scene(wf.Scene([shape], [SUN]), NumpyAccelerator)
+
+
+def test_what_it_is_for() -> None:
+    """Opaque triangles of which at least one normal differs from that of the triangle, however little."""
+    flat = np.array([[0, 0, 1]] * 3)
+    bent = flat + np.array([[1e-6, 0, 0], [0, 0, 0], [0, 0, 0]])
+    corners, faces = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0]]), np.array([[0, 1, 2]])
+    for normals, found in ((flat, False), (bent, True)):
+        program = compiled(wf.Mesh(corners, faces, normals=normals)).program
+        assert (program.find(ShadowTerminator) is not None) == found
+    glass = wf.Mesh(corners, faces, normals=bent, material=wf.Dielectric(1.5))
+    assert compiled(glass).program.find(ShadowTerminator) is None
+
+
+def test_flat_neighbors_and_hollows_keep_their_bits() -> None:
+    """Beside a smooth ball far away; and where the round surface is below the triangles."""
+    floor = wf.Rectangle((-1, 0, 1), (2, 0, 0), (0, 0, -2), material=wf.Diffuse(0.6))
+    far = wf.Mesh(BALL.vertices * 0.01 + (50, 0, 0), BALL.faces, normals=BALL.vertices)
+    rough = wf.Mesh(BALL.vertices * 0.01 + (50, 0, 0), BALL.faces)
+    camera = wf.Camera.look_at((0, 2, 3), (0, 0, 0), size=(24, 24))
+    light = [wf.PointLight((0.2, 1, 0.1), 5)]
+    one, two = (wf.render(wf.Scene([floor, each], light, camera), **FAST).rgb for each in (far, rough))
+    np.testing.assert_array_equal(one, two)
+    inside = wf.Mesh(BALL.vertices, BALL.faces[:, ::-1], normals=-BALL.vertices, material=wf.Diffuse(0.5))
+    scene = wf.Scene(
+        [inside], [wf.PointLight((0.2, 0.1, 0), 0.5)], wf.Camera.look_at((0, 0, 0), (0, 0, -1), size=(24, 24))
+    )
+    program = compiled(inside).program.find(ShadowTerminator)
+    assert program is not None
+    assert (program.heights >= 0).all()
+    assert wf.render(scene, **FAST).rgb.min() > 0
+
+
+def test_heights_are_above_the_planes_of_vertices() -> None:
+    """By the formula: (v_j - v_i)·n_i, 0 for a triangle with its own normal."""
+    corners = np.array([[[0, 0, 0], [2, 0, 0], [0, 3, 0]]], np.float32)
+    ng = np.array([[0], [0], [1]], np.float32)
+    tilted = np.array([[0.6], [0], [0.8]], np.float32)
+    heights = heights_of(corners, (tilted, ng, ng), ng)
+    np.testing.assert_allclose(heights[:, 0], [1.2, 0, 0, 0, 0, 0])
+    assert not heights_of(corners, (ng, ng, ng), ng).any()

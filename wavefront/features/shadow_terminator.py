@@ -1,0 +1,161 @@
+"""Where the light ends on smooth meshes: not at the edges of their triangles.
+
+Triangles with normals of vertices stand for a round surface above them. Where light grazes it, the flat
+triangle shadows itself, and its neighbors shadow it, so the edge of the shadow has steps. Rays here leave
+from the round surface, and directions below the plane of a triangle count if they are above its shading
+normal. They may meet the triangle itself, so that no light gets through it.
+
+Source: J. Hanika 2021, "Hacking the Shadow Terminator", Ray Tracing Gems II, chapter 4.
+"""
+
+from __future__ import annotations
+
+from typing import Self
+
+import numpy as np
+
+from ..arrays.soa import soa
+from ..arrays.state import Paths, SurfaceInteraction
+from ..arrays.vec import ALL, Bools, Floats, Ints, Lanes, dot, f4, take
+from ..compile.program import Facts, Feature
+from ..compile.scene import CompiledScene
+from ..sampling.sampler import Sampler
+from ..stages.interaction import Surfaces, at_corners
+from ..stages.intersect import ShadowRays
+from ..stages.shade import Shading
+
+
+class RoundSurfaces(Surfaces):
+    """Surfaces that know how far the round surface is above them."""
+
+    __slots__ = ()
+
+    def interaction(self) -> SurfaceInteraction:
+        """Return their geometry, with `lift`."""
+        surface = super().interaction()
+        feature = self.scene.program.find(ShadowTerminator)
+        assert feature is not None
+        surface.lift = self._lift(feature, surface)
+        return surface
+
+    def _lift(self, feature: ShadowTerminator, surface: SurfaceInteraction) -> Floats:
+        """Return the way (3, n) to the round surface on the side of wo, 0 where there is none."""
+        scene, hits = self.scene, self.hits
+        lift = np.zeros_like(surface.point)
+        lanes = np.flatnonzero((hits.prim >= 0) & (hits.prim < scene.triangles))
+        lanes = lanes[~feature.transmissive.take(surface.material.take(lanes))]
+        prim = hits.prim.take(lanes)
+        lanes = lanes[feature.curved.take(prim)]
+        if not lanes.size:
+            return lift
+        some = hits.take(lanes)
+        assert some.b1 is not None
+        assert some.b2 is not None
+        weights = (f4(1) - some.b1 - some.b2, some.b1, some.b2)
+        side = np.where(surface.back_facing.take(lanes), f4(-1), f4(1))
+        k = feature.heights.take(some.prim, 1)
+        assert scene.corner_normals is not None
+        total = np.zeros((3, lanes.size), f4)
+        for corner, normal in enumerate(at_corners(scene.corner_normals, some, scene.triangles)):
+            one, other = (weights[each] for each in range(3) if each != corner)
+            below = side * (one * k[2 * corner] + other * k[2 * corner + 1])  # of the plane at the vertex
+            total += normal * (weights[corner] * side * np.maximum(-below, f4(0)))
+        lift[:, lanes] = total
+        return self.vectors(lift)
+
+
+class RoundShading(Shading):
+    """Surfaces that rays leave from above their triangles."""
+
+    __slots__ = ()
+
+    def prepare(self, scene: CompiledScene) -> None:
+        """Lift where rays start."""
+        super().prepare(scene)
+        if self.surface.lift is not None:
+            self.start = self.start + self.surface.lift
+
+    def origins(self, cos_g: Floats) -> Floats:
+        """Return where rays start, lifted where they leave above the surface."""
+        origins = super().origins(cos_g)
+        return origins if origins is self.start else np.where(cos_g < 0, origins, self.start)
+
+    def cosines(self, local: Floats, world: Floats) -> tuple[Floats, Floats]:
+        """Return the cosines; below the plane of a triangle with a round surface those above that count."""
+        cos, cos_g = super().cosines(local, world)
+        if self.surface.lift is None:
+            return cos, cos_g
+        turned = np.flatnonzero((local[2] > 0) & (cos_g <= 0) & self._round())
+        if turned.size:
+            cos, cos_g = cos.copy(), cos_g.copy()
+            cos[turned], cos_g[turned] = local[2].take(turned), -cos_g.take(turned)
+        return cos, cos_g
+
+    def enter(
+        self,
+        scene: CompiledScene,
+        rays: ShadowRays,
+        paths: Paths,
+        lanes: Ints,
+        light: Ints,
+        cos_g: Floats,
+        sampler: Sampler,
+        bounce: int,
+    ) -> None:
+        """Let shadow rays that dive below their triangles meet these."""
+        super().enter(scene, rays, paths, lanes, light, cos_g, sampler, bounce)
+        rays.exclude_prim = self._left(rays.exclude_prim, rays.direction, lanes)
+
+    def leave(self, paths: Paths, left: Paths, cos_g: Floats, bounce: int) -> None:
+        """Let paths that dive below their triangles meet these."""
+        super().leave(paths, left, cos_g, bounce)
+        left.exclude_prim = self._left(left.exclude_prim, left.direction, ALL)
+
+    def _left(self, prim: Ints, direction: Floats, lanes: Lanes) -> Ints:
+        """Return what rays (k,) of lanes do not meet: nothing where they start above a triangle and dive."""
+        if self.surface.lift is None:
+            return prim
+        dives = take(self._round(), lanes) & (dot(take(self.surface.ng, lanes), direction) < 0)
+        dives &= dot(take(self.surface.ns, lanes), direction) > 0
+        return np.where(dives, np.intp(-1), prim) if dives.any() else prim
+
+    def _round(self) -> Bools:
+        assert self.surface.lift is not None
+        return np.asarray(self.surface.lift.any(0))
+
+
+@soa
+class ShadowTerminator(Feature):
+    """Has rays leave smooth meshes from the round surface that their normals stand for."""
+
+    surfaces = RoundSurfaces
+    shading = RoundShading
+
+    # (6, m) for each corner of a triangle, how high the other two are above the plane at its normal
+    heights: Floats
+    curved: Bools  # (m,) triangles with a vertex that the round surface leaves
+    transmissive: Bools  # (materials,) those that light crosses: it bends at the triangles themselves
+
+    @classmethod
+    def of(cls, facts: Facts) -> Self | None:
+        """Return the feature of a scene with opaque triangles whose normals differ from theirs."""
+        corners = facts.compiled.corner_normals
+        if corners is None:
+            return None
+        heights = heights_of(facts.corners, corners, facts.compiled.normals)
+        transmissive = np.array([material.bsdf.transmissive for material in facts.materials], np.bool_)
+        curved = np.asarray(heights.any(0))
+        return cls(heights, curved, transmissive) if curved.any() and not transmissive.all() else None
+
+
+def heights_of(corners: Floats, normals: tuple[Floats, ...], ng: Floats) -> Floats:
+    """Return for each corner of triangles (m, 3, 3) how high the others are above its plane, (6, m)."""
+    heights = np.zeros((6, len(corners)), f4)
+    bent = np.flatnonzero(np.logical_or.reduce([(normal != ng).any(0) for normal in normals]))
+    points = corners[bent].transpose(1, 2, 0)
+    for corner, normal in enumerate(normals):
+        others = [each for each in range(3) if each != corner]
+        for row, other in enumerate(others):
+            away = points[other] - points[corner]
+            heights[2 * corner + row, bent] = (away * normal.take(bent, 1)).sum(0)
+    return heights
