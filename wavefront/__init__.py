@@ -373,6 +373,7 @@ def __getattr__(name: str) -> Any:
     else:
         hint = did_you_mean(name, __all__, (__name__,)) if not name.startswith("_") else ""
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}{hint}")
+    import_module(".io.to_scene", __name__)  # registers what is taken of other libraries
     globals()[name] = found  # from now on without this function
     return found
 

@@ -170,7 +170,7 @@ def test_what_has_no_normal_is_lit_alike(kind: type[LightRecord]) -> None:
 
 def test_points_in_a_volume_are_receivers_without_a_normal(calls_of) -> None:
     """They are not opaque, so their normal, which is only a frame for the phase function, has no effect."""
-    calls = calls_of("wavefront.stages.shade.receiver_of")
+    calls = calls_of("wavefront.features.receivers.receiver_of")
     mist = wf.Material(wf.NullSurface(), interior=wf.Medium(0.1, 2.0))
     shapes = [
         wf.Sphere((0, 0.5, 0), 0.4, material=mist),

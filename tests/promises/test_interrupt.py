@@ -107,10 +107,11 @@ print(image, "left", left())
 
 def test_ctrl_c_while_a_scene_is_set_up() -> None:
     body = """
+import importlib
 def compile_scene(*_, **__):
     print("compiling", flush=True)
     rest()
-sys.modules["wavefront.drive.prepared_scene"].compile_scene = compile_scene
+importlib.import_module("wavefront.drive.prepared_scene").compile_scene = compile_scene
 try:
     wf.render(light, 1)
 except wf.Interrupted as stop:

@@ -139,6 +139,7 @@ def test_every_light_is_here() -> None:
         *("TwoSidedTexturedTriangleLights", "TwoSidedRectangleLights", "SphereLights", "SunLight"),
         *("TexturedSphereLights", "ImageEnvironment", "ConstantEnvironment", "EnvironmentSum", "SkyLight"),
         "PatchedEnvironment",
+        "OctahedralEnvironment",  # in tests/lights/test_octahedral.py
         "GlowLights",  # points in a volume, in tests/lights/test_glow.py
         *("DirectionalLights", "PointLightRecord", "SpotLights", "PicturedLights", "IESLights"),
     }

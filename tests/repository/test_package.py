@@ -120,6 +120,12 @@ def test_a_first_picture_leaves_heavy_modules_alone(tmp_path):
     assert python(code, f"{tmp_path}/").splitlines() == ["[]", "[]", "[]", "[]", "['imageio', 'PIL']"]
 
 
+def test_scenes_take_what_other_libraries_have():
+    """Whatever is asked for first, also where nothing is rendered."""
+    code = "import trimesh\nfrom wavefront import Scene\nprint(len(Scene(trimesh.creation.box()).shapes))"
+    assert python(code).split() == ["1"]
+
+
 def test_what_is_imported_later_is_there():
     """By attribute, by `from` and by `dir`; a name that does not exist is an error as in any module."""
     assert {*wf._MODULES, *wf._HOME_OF} == set(wf.__all__)

@@ -42,7 +42,7 @@ def test_what_the_pictures_cannot_share(given):
 
 
 def test_no_samples_are_told_where_direct_light_is():
-    with pytest.raises(wf.SceneError, match=r'spp is 0; it must be at least 1 .*integrator="direct_mis"'):
+    with pytest.raises(wf.SceneError, match=r'spp is 0; it must be .*integrator="direct_mis"'):
         wf.render(FURNACE, 0, camera=INSIDE)
 
 

@@ -196,11 +196,10 @@ class Settings:
         samples = self.values["samples"]
         if isinstance(samples, range):
             return self._chosen_samples(samples, most)
-        if self.values["spp"] == 0:
-            raise SceneError(
-                'spp is 0; it must be at least 1 (light without reflections is integrator="direct_mis")'
-            )
         if self.values["spp"] is not None:
+            if type(self.values["spp"]) is int and self.values["spp"] == 0:
+                direct = 'light that is reflected once at most is integrator="direct_mis"'
+                raise SceneError(f"spp is 0; it must be a whole number from 1 to {most}; {direct}")
             return int(whole_number(1, most)("spp", self.values["spp"]))
         if self.values["seconds"] is not None:
             return most
