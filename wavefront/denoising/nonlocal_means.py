@@ -37,7 +37,7 @@ VISIBLE = 0.01  # of a pixel's value: noise of which half is removed
 LEAST_ALBEDO = 0.02  # added to the albedo that colors are divided by
 LEAST_VARIANCE = 1e-10
 FARTHEST = 8  # the distance from which on a weight is 0
-TILE = (64, 256)  # rows and columns that are filtered together: few enough for the cache
+TILE = (128, 512)  # rows and columns that are filtered together: few for the cache, many for threads
 
 Window: TypeAlias = tuple[slice, slice]  # rows and columns
 
