@@ -113,3 +113,6 @@ def test_heights_are_above_the_planes_of_vertices() -> None:
     heights = heights_of(corners, (tilted, ng, ng), ng)
     np.testing.assert_allclose(heights[:, 0], [1.2, 0, 0, 0, 0, 0])
     assert not heights_of(corners, (ng, ng, ng), ng).any()
+    for cosine, some in ((0.501, True), (0.499, False)):  # of the normal that leans most
+        leaning = np.array([[np.sqrt(1 - cosine**2)], [0], [cosine]], np.float32)
+        assert heights_of(corners, (leaning, ng, ng), ng).any() == some

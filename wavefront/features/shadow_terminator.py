@@ -24,6 +24,8 @@ from ..stages.interaction import Surfaces, at_corners
 from ..stages.intersect import ShadowRays
 from ..stages.shade import Shading
 
+LEAST_COSINE = f4(0.5)  # of normals at vertices with that of the triangle
+
 
 class RoundSurfaces(Surfaces):
     """Surfaces that know how far the round surface is above them."""
@@ -149,9 +151,13 @@ class ShadowTerminator(Feature):
 
 
 def heights_of(corners: Floats, normals: tuple[Floats, ...], ng: Floats) -> Floats:
-    """Return for each corner of triangles (m, 3, 3) how high the others are above its plane, (6, m)."""
+    """Return for each corner of triangles (m, 3, 3) how high the others are above its plane, (6, m).
+
+    They are 0 where a normal leans so far that no round surface is meant.
+    """
     heights = np.zeros((6, len(corners)), f4)
-    bent = np.flatnonzero(np.logical_or.reduce([(normal != ng).any(0) for normal in normals]))
+    upright = np.logical_and.reduce([dot(normal, ng) > LEAST_COSINE for normal in normals])
+    bent = np.flatnonzero(upright & np.logical_or.reduce([(normal != ng).any(0) for normal in normals]))
     points = corners[bent].transpose(1, 2, 0)
     for corner, normal in enumerate(normals):
         others = [each for each in range(3) if each != corner]
