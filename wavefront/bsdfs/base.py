@@ -80,7 +80,7 @@ class Bsdf(Parametrized, ABC):
         return preview_html(self)
 
     def plot(self, wo: ArrayLike = (0.6, 0.0, 0.8), axes: Any = None) -> Any:
-        """Draw f, f·|cosθ| and the density with which directions are drawn, for light seen from a direction.
+        """Draw f, f times the cosine, and the density with which directions are drawn, seen from a direction.
 
         The curves are polar, in the plane of `wo` and the normal, which points up. Directions below cross the
         surface. Of f it is the luminance. Delta lobes have no curve.

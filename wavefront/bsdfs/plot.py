@@ -20,7 +20,7 @@ DIRECTIONS = 1440  # around the point, in the plane of `wo` and the normal
 
 
 def draw_lobes(bsdf: Bsdf, wo: ArrayLike, axes: Any = None) -> Any:
-    """Draw f, f·|cosθ| and the density of a BSDF, and return the axes; see `Bsdf.plot`."""
+    """Draw f, f times the cosine, and the density of a BSDF, and return the axes; see `Bsdf.plot`."""
     pyplot = import_pyplot()
     textures = [name for name, value in vars(bsdf).items() if isinstance(value, BaseTexture)]
     if textures:
