@@ -270,9 +270,11 @@ def subjects() -> list[wf.Mesh | wf.Sphere]:
 def sheet(width: int, spp: int) -> wf.Image:
     """Render all of them, side by side; the picture is `width` pixels wide."""
     size = width // COLUMNS
-    tiles = [wf.render(subject, spp, size=(size, size), progress=False).rgb for subject in subjects()]
+    images = [wf.render(subject, spp, size=(size, size), progress=False) for subject in subjects()]
+    tiles = [image.rgb for image in images]
     rows = [np.hstack(tiles[first : first + COLUMNS]) for first in range(0, len(tiles), COLUMNS)]
-    return wf.Image(np.vstack(rows), spp)
+    tone = {"tone": images[0].metadata["tone"]}  # by which a picture of chosen light is shown
+    return wf.Image(np.vstack(rows), spp, metadata=tone)
 
 
 if __name__ == "__main__":
