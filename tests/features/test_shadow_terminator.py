@@ -6,8 +6,14 @@ import trimesh
 
 import wavefront as wf
 from wavefront.accel.numpy_accel import NumpyAccelerator
+from wavefront.arrays.vec import highest, normalize
 from wavefront.features.compiling import compile_scene
 from wavefront.features.shadow_terminator import ShadowTerminator, heights_of
+from wavefront.sampling.tiles import MEMBERS
+from wavefront.stages.interaction import interaction
+from wavefront.stages.intersect import Rays, intersect
+from wavefront.stages.reuse import FirstPoints, SharedPoints, attenuate, connect
+from wavefront.stages.shade import shading
 
 SUN = wf.DirectionalLight((-1, -0.3, -0.2), 3.0)
 BALL = trimesh.creation.icosphere(2, 1.0)
@@ -116,3 +122,70 @@ def test_heights_are_above_the_planes_of_vertices() -> None:
     for cosine, some in ((0.501, True), (0.499, False)):  # of the normal that leans most
         leaning = np.array([[np.sqrt(1 - cosine**2)], [0], [cosine]], np.float32)
         assert heights_of(corners, (leaning, ng, ng), ng).any() == some
+
+
+def bent_triangle(material):
+    """A triangle at z = 0 whose normals lean by 30 degrees to where it ends in a point."""
+    corners = np.array([[1.0, 0, 0], [-0.5, 0.8, 0], [-0.5, -0.8, 0]])
+    return wf.Mesh(corners, [[0, 1, 2]], normals=np.tile((0.5, 0, 0.75**0.5), (3, 1)), material=material)
+
+
+def seen_from_above(scene, rng):
+    """Points of the triangle, ready to be shaded."""
+    point = rng.uniform(-0.4, 0.4, (2, MEMBERS)).astype(np.float32)
+    away = np.stack([*point, np.full(MEMBERS, 2, np.float32)]) - scene.center[:, None].astype(np.float32)
+    down = np.repeat(np.array([[0], [0], [-1]], np.float32), MEMBERS, 1)
+    rays = Rays(away, down, np.full(MEMBERS, -1))
+    return shading(scene, interaction(scene, rays, intersect(scene, rays)))
+
+
+@pytest.mark.parametrize("material", [wf.Diffuse(0.7), wf.Plastic(0.5, roughness=0.3)])
+def test_shared_points_below_the_triangle_are_seen_only_past_it(material) -> None:
+    """A connection has the value that a path of its own has, and its ray meets the triangle."""
+    scene, rng = compiled(bent_triangle(material)), np.random.default_rng(1)
+    lit = seen_from_above(scene, rng).lit()
+    grid = np.arange(MEMBERS)[:, None]
+    first = FirstPoints.of(lit, None, grid)
+    assert first is not None
+    dives = {True: 0, False: 0}
+    for x, y in [(0.4, 0), (0.2, 0.1), (3, 0), (3, 2)]:
+        at = np.array([[x], [y], [-0.04]], np.float32) - scene.center[:, None].astype(np.float32)
+        toward = lit.start.mean(1)[:, None] - at
+        ng, zero = toward / np.linalg.norm(toward), np.zeros(1, np.intp)
+        target = SharedPoints(zero, zero, at, np.zeros(1, np.float32), ng, ng, np.ones((3, 1), np.float32))
+        attenuate(scene, [found := connect(scene, first, target, np.array([True]), MEMBERS - 1)])
+        wi, distance = normalize(at - lit.start), np.linalg.norm(at - lit.start, axis=0)
+        local = lit.frame.to_local(wi)
+        f = highest(lit.evaluate(local)[0] * lit.cosines(local, wi)[0])
+        seen = ~scene.accelerator.occluded(lit.start, wi, distance * 0.999, np.full(MEMBERS, -1))
+        np.testing.assert_array_equal((found.geometry[:, 0] > 0)[:-1], (seen & (f > 0))[:-1])
+        np.testing.assert_allclose(highest(found.f[..., 0]), f, rtol=1e-4)
+        for each in (True, False):
+            dives[each] += np.count_nonzero((f > 0) & (seen == each))
+    assert min(dives.values()) > 5
+
+
+@pytest.mark.filterwarnings("ignore:the picture is")
+@pytest.mark.parametrize("mirror", ["the triangle", "what is behind it"])
+def test_paths_from_lights_do_not_find_what_goes_below_triangles(mirror) -> None:
+    """All light here goes below a triangle: paths from the camera find it, and nothing is added to it."""
+    if mirror == "the triangle":
+        shapes = [
+            bent_triangle(wf.Mirror(1)),
+            wf.Rectangle((-1.2, -1, -0.2), (0, 2, 0), (0, 0, 1.5), material=wf.Diffuse(0.8)),
+            wf.Sphere((2.5, 0, -0.5), 0.45, emission=9),
+        ]
+        camera = wf.Camera.look_at((0.5, -2, 2.5), (-1.2, 0, 0.4), fov=40, size=(24, 24))
+    else:
+        shapes = [
+            bent_triangle(wf.Diffuse(0.8)),
+            wf.Rectangle((-2, -2, -1.5), (4, 0, 0), (0, 4, 0), material=wf.Mirror(0.9)),
+            wf.Sphere((1.6, 0, -0.8), 0.2, emission=9),
+        ]
+        camera = wf.Camera.look_at((0, 0, 4), (0, 0, 0), up=(0, 1, 0), fov=14, size=(24, 24))
+    one, two = (
+        wf.render(wf.Scene(shapes, [], camera), **{**FAST, "spp": 32}, max_bounces=3, caustics=caustics).rgb
+        for caustics in (False, True)
+    )
+    assert one.mean() > 1e-5
+    np.testing.assert_allclose(two, one, rtol=1e-5)

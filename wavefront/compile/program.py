@@ -83,6 +83,8 @@ class Feature:
     ----------
     camera_only
         It acts on the first leg of paths from the camera alone, and not on those from sensors.
+    from_lights
+        Paths from lights meet it, too.
     drawn
         Its opacities draw random numbers, so that only paths meet them.
     dims_shadows
@@ -115,6 +117,7 @@ class Feature:
 
     __slots__ = ()
     camera_only: ClassVar[bool] = False
+    from_lights: ClassVar[bool] = True
     drawn: ClassVar[bool] = False
     dims_shadows: ClassVar[bool] = False
     spares_opaque: ClassVar[bool] = False
@@ -271,6 +274,10 @@ class Program:
     def of_sensors(self) -> Program:
         """Return the program of paths that start at sensors: these measure the light that is there."""
         return Program([each for each in self.features if not each.camera_only])
+
+    def of_lights(self) -> Program:
+        """Return the program of paths from lights."""
+        return Program([each for each in self.features if each.from_lights])
 
     def find(self, kind: type[AnyFeature]) -> AnyFeature | None:
         """Return the feature of a kind; None if the scene does not have it."""

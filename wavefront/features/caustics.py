@@ -21,10 +21,15 @@ class FirstSurfaces(Shading):
     __slots__ = ()
 
     def leave(self, paths: Paths, left: Paths, cos_g: Floats, bounce: int) -> None:
-        """Note which paths leave their first surface by a lobe that is not a delta lobe."""
+        """Note which paths leave their first surface by a lobe that is not a delta lobe.
+
+        Paths from lights know of no directions that go below a triangle (shadow_terminator.py).
+        """
         super().leave(paths, left, cos_g, bounce)
-        if bounce == 0 and paths.light_traced is not None:
-            left.light_traced = paths.light_traced & ~left.specular
+        if paths.light_traced is not None:
+            left.light_traced = paths.light_traced & (left.exclude_prim == self.surface.prim)
+            if bounce == 0:
+                left.light_traced &= ~left.specular
 
 
 @soa

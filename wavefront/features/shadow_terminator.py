@@ -15,13 +15,11 @@ from typing import Self
 import numpy as np
 
 from ..arrays.soa import soa
-from ..arrays.state import Paths, SurfaceInteraction
-from ..arrays.vec import ALL, Bools, Floats, Ints, Lanes, dot, f4, take
+from ..arrays.state import SurfaceInteraction
+from ..arrays.vec import Bools, Floats, Ints, Lanes, dot, f4, take
 from ..compile.program import Facts, Feature
 from ..compile.scene import CompiledScene
-from ..sampling.sampler import Sampler
 from ..stages.interaction import Surfaces, at_corners
-from ..stages.intersect import ShadowRays
 from ..stages.shade import Shading
 
 LEAST_COSINE = f4(0.5)  # of normals at vertices with that of the triangle
@@ -78,9 +76,11 @@ class RoundShading(Shading):
             self.start = self.start + self.surface.lift
 
     def origins(self, cos_g: Floats) -> Floats:
-        """Return where rays start, lifted where they leave above the surface."""
+        """Return where rays start: above the round surface where there is one, as no light crosses it."""
         origins = super().origins(cos_g)
-        return origins if origins is self.start else np.where(cos_g < 0, origins, self.start)
+        if self.surface.lift is None or origins is self.start:
+            return origins
+        return np.where((cos_g < 0) & ~self._round(), origins, self.start)
 
     def cosines(self, local: Floats, world: Floats) -> tuple[Floats, Floats]:
         """Return the cosines; below the plane of a triangle with a round surface those above that count."""
@@ -93,28 +93,9 @@ class RoundShading(Shading):
             cos[turned], cos_g[turned] = local[2].take(turned), -cos_g.take(turned)
         return cos, cos_g
 
-    def enter(
-        self,
-        scene: CompiledScene,
-        rays: ShadowRays,
-        paths: Paths,
-        lanes: Ints,
-        light: Ints,
-        cos_g: Floats,
-        sampler: Sampler,
-        bounce: int,
-    ) -> None:
-        """Let shadow rays that dive below their triangles meet these."""
-        super().enter(scene, rays, paths, lanes, light, cos_g, sampler, bounce)
-        rays.exclude_prim = self._left(rays.exclude_prim, rays.direction, lanes)
-
-    def leave(self, paths: Paths, left: Paths, cos_g: Floats, bounce: int) -> None:
-        """Let paths that dive below their triangles meet these."""
-        super().leave(paths, left, cos_g, bounce)
-        left.exclude_prim = self._left(left.exclude_prim, left.direction, ALL)
-
-    def _left(self, prim: Ints, direction: Floats, lanes: Lanes) -> Ints:
-        """Return what rays (k,) of lanes do not meet: nothing where they start above a triangle and dive."""
+    def unmet(self, prim: Ints, direction: Floats, lanes: Lanes) -> Ints:
+        """Return what rays do not meet: nothing where they start above their triangles and dive."""
+        prim = super().unmet(prim, direction, lanes)
         if self.surface.lift is None:
             return prim
         dives = take(self._round(), lanes) & (dot(take(self.surface.ng, lanes), direction) < 0)
@@ -130,6 +111,7 @@ class RoundShading(Shading):
 class ShadowTerminator(Feature):
     """Has rays leave smooth meshes from the round surface that their normals stand for."""
 
+    from_lights = False  # these hit the triangles themselves, from the side that the light is on
     surfaces = RoundSurfaces
     shading = RoundShading
 

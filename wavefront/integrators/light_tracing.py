@@ -72,6 +72,7 @@ def trace_light(
     max_bounces
         The most scattering events of a path, at least 0.
     """
+    scene = replace(scene, program=scene.program.of_lights())
     assert scene.specular_surfaces is not None
     if max_bounces < 2 or scene.lights.choice is None:
         return _nothing()

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 from ..arrays.state import Paths
-from ..arrays.vec import Floats, Ints, f4, normalize, signs, take
+from ..arrays.vec import ALL, Floats, Ints, f4, normalize, signs, take
 from ..bsdfs import BsdfSample, sampled
 from ..sampling.sampler import Dimension, Sampler
 from .interaction import LIFT
@@ -65,7 +65,7 @@ def bounce_sample(paths: Paths, shade: Shading, sampler: Sampler, bounce: int) -
         sample=paths.sample,
         origin=shade.origins(cos_g),
         direction=direction,
-        exclude_prim=surface.prim,
+        exclude_prim=shade.unmet(surface.prim, direction, ALL),
         throughput=throughput,
         pdf=sample.pdf,
         specular=specular,

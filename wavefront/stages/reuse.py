@@ -44,7 +44,7 @@ from ..compile.media import stacks_leaving
 from ..compile.scene import CompiledScene
 from ..sampling.tiles import MEMBERS, WaveTiles
 from .glossy_points import SECTIONS, GlossyPoints, glossy_materials
-from .interaction import interaction, material_rows, offset_origin
+from .interaction import interaction, material_rows
 from .intersect import ShadowRays, visible
 from .shade import Guidance, Shading
 from .transmittance import transmittance_along
@@ -155,7 +155,8 @@ def add_shared(
     number_in = [
         tiles.grid(points.slot, np.flatnonzero(shining & (points.way == way))) for way in range(branches)
     ]
-    own_cosine = lit.surface.unmapped is None and lit.surface.folds is None
+    surface = lit.surface
+    own_cosine = surface.unmapped is None and surface.folds is None and surface.lift is None
     plain = own_cosine and all(bsdf.lambertian for _, bsdf in lit.groups)
     albedo = lit.albedo() if plain else None
     received = [np.zeros((3, slot.size), f4) for _ in sums]
@@ -359,7 +360,12 @@ class FirstPoints:
             return self.start
         surface, shape = self.shade.surface, self.start.shape
         cos = dot(surface.ng.reshape(shape), point - surface.point.reshape(shape))
-        return offset_origin(surface, cos.reshape(-1)).reshape(shape)
+        return self.shade.origins(cos.reshape(-1)).reshape(shape)
+
+    def unmet(self, direction: Floats, lanes: Ints) -> Ints:
+        """Return the primitives (k,) that rays from some cells along directions (3, k) do not meet."""
+        prim = take(self.prim, lanes)
+        return prim if self.shade is None else self.shade.unmet(prim, direction, lanes)
 
     def stacks(self, direction: Floats, lanes: Ints) -> Any:
         """Return the stacks (4, k) of rays that leave some cells along directions (3, k)."""
@@ -426,14 +432,15 @@ def connect(
         possible[member] = False
     lanes = np.flatnonzero(possible)
     error = first.error + target.error
+    toward = take(wi, lanes)
     rays = ShadowRays(
         origin=take(start.reshape(3, -1), lanes),
-        direction=take(wi, lanes),
-        exclude_prim=take(first.prim, lanes),
+        direction=toward,
+        exclude_prim=first.unmet(toward, lanes),
         error=take(error.reshape(-1), lanes),
         distance=f4(1) / take(inverse.reshape(-1), lanes),
         cos_light=take(cos_target.reshape(-1), lanes),
-        media=first.stacks(take(wi, lanes), lanes),
+        media=first.stacks(toward, lanes),
     )
     return Connections(f.reshape(-1, *shape), pdf.reshape(shape), geometry, lanes, rays)
 

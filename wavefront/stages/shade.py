@@ -134,6 +134,10 @@ class Shading:
     def prepare(self, scene: CompiledScene) -> None:
         """Get ready to be shaded."""
 
+    def unmet(self, prim: Ints, direction: Floats, lanes: Lanes) -> Ints:
+        """Return the primitives (k,) that rays along (3, k) do not meet: `prim`, which they leave, or -1."""
+        return prim
+
     def density(self, lanes: Lanes, world: Floats, pdf: Floats) -> Floats:
         """Return the densities (k,) with which paths take world directions, given those of the BSDFs.
 
@@ -286,6 +290,7 @@ def direct(
     origin = shade.origins(cos_g) if (lit & (cos_g < 0)).any() else shade.start
     rays = shadow_rays(shade.surface, origin, light, lanes)
     number = take(number, lanes)
+    rays.exclude_prim = shade.unmet(rays.exclude_prim, rays.direction, lanes)
     shade.enter(scene, rays, paths, lanes, number, cos_g, sampler, bounce)
     radiance = radiance_at_samples(scene, rays, light, lanes, number)
     if scene.program.dims_shadows:
