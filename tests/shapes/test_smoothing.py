@@ -82,6 +82,12 @@ def test_the_crease_angle_divides() -> None:
         assert len(smooth.vertices) == 6
 
 
+def test_auto_divides_at_60_degrees() -> None:
+    """Between the 51 degrees of a pipe of seven sides and the edges of a regular tetrahedron or a box."""
+    assert wf.Mesh(*roof(60.1), smooth="auto").normals is None
+    assert wf.Mesh(*roof(59.9), smooth="auto").normals is not None
+
+
 def test_a_ball_without_normals_is_round() -> None:
     """The computed normals are within a degree of those of a sphere; facets bend by 8°."""
     mesh = wf.Mesh(*soup(BALL.vertices, BALL.faces), smooth=True)

@@ -121,7 +121,8 @@ class RenderSettings(TypedDict, total=False):
             "The direction from which a scene is framed, in place of the scene's own camera: "
             '"three_quarter", "front", "back", "left", "right", "top", "bottom", "iso", or a vector (3,) '
             "from the middle of the scene to the camera. A scene without a camera is seen from "
-            '"three_quarter": 35° to the right of the front and 22° above it.',
+            '"three_quarter": 35° to the right of the front and 22° above it; a flat one '
+            "without light from its broad side.",
             option=f"direction from which the scene is framed: {', '.join(VIEWS)} (default: {FRAMING_VIEW}, "
             "where the file has no camera)",
             check=optional(check_view),
