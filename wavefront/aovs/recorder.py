@@ -6,17 +6,15 @@ and integrators of a user's own give the same AOVs if they are made of the same 
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
-from typing import Any
+from collections.abc import Sequence
 
 import numpy as np
 
 from ..arrays.path_recorder import NOBODY, PathRecorder
 from ..arrays.soa import soa
 from ..arrays.state import BounceDepth, Contribution, Hits, Paths
-from ..arrays.vec import Bools, Bytes, Floats, Ints, add_to_slots, broadcast, f4, put, take
+from ..arrays.vec import Bools, Floats, Ints, add_to_slots, broadcast, f4, put, take
 from ..colors import EFFICACY
-from ..compile.light_groups import PATCHED, LightGroups
 from ..compile.program import Leg
 from ..compile.scene import CompiledScene
 from ..core.errors import SceneError
@@ -25,22 +23,16 @@ from ..film.aov_samples import BOUNDED, AovSamples, FixedPointSamples, fixed_poi
 from ..stages.compact import compact
 from ..stages.interaction import interaction
 from ..stages.shade import Shading, shading
+from .clamp import Clamp
+from .coverage import Coverage
+from .direct_light import DirectLight, depth_after
+from .light_by_group import LightByGroup
 from .lux import lux_of
 from .narrow_lobes import NarrowLobes
 
 FEATURES = ("denoising_albedo", "denoising_normal")
 OF_LIGHT = ("direct", "indirect", "light_groups", CLAMPED)
 BY_LIGHT = ("light_groups", LUX)  # what parts of the light are told apart for by the light they are from
-
-# (3, 2) the depth after a scattering, by the depth before it and by whether it is specular
-DEPTH_AFTER = np.array(
-    [
-        [BounceDepth.DIRECT, BounceDepth.CAMERA],
-        [BounceDepth.INDIRECT, BounceDepth.INDIRECT],
-        [BounceDepth.INDIRECT, BounceDepth.INDIRECT],
-    ],
-    np.uint8,
-)
 
 
 @soa
@@ -75,12 +67,13 @@ class SampleRecorder(PathRecorder):
         self._values = {name: np.zeros((AOVS[name].channels, n), f4) for name in BOUNDED if name in wanted}
         self._coverage = Coverage(scene, n) if "coverage" in wanted else None
         self._narrow = NarrowLobes(n) if NARROW in wanted else None
+        self._direct = DirectLight(n) if "direct" in wanted or "indirect" in wanted else None
+        self._clamp = Clamp(clamp, n) if clamp is not None and CLAMPED in wanted else None
         self._light: dict[str, Floats] = {}
-        if "direct" in wanted or "indirect" in wanted:
-            self._light["direct"] = np.zeros((3, n), f4)
-        self._clamp = clamp
-        if CLAMPED in wanted:
-            self._light[CLAMPED] = np.zeros((3, n), f4)
+        if self._direct is not None:
+            self._light["direct"] = self._direct.light
+        if self._clamp is not None:
+            self._light[CLAMPED] = self._clamp.light
         self._groups = LightByGroup(scene.light_groups, n) if "light_groups" in wanted else None
         if self._groups is not None:
             self._light.update((f"light_groups.{name}", light) for name, light in self._groups.items())
@@ -102,7 +95,7 @@ class SampleRecorder(PathRecorder):
         paths.recorder = self
         if self._narrow is not None:
             self._narrow.begin(paths)
-        if "direct" in self._light or CLAMPED in self._light:
+        if self._direct is not None or self._clamp is not None:
             paths.depth = broadcast(np.uint8(BounceDepth.CAMERA), len(paths))
         if any(name in self._values for name in FEATURES):
             paths.met_rough = np.zeros(len(paths), np.bool_)
@@ -209,28 +202,15 @@ class SampleRecorder(PathRecorder):
     def record_scattering(self, paths: Paths, shade: Shading, left: Paths) -> None:
         """Keep how deep paths are."""
         if paths.depth is not None:
-            left.depth = _after(paths.depth, left.specular)
+            left.depth = depth_after(paths.depth, left.specular)
 
     # --- Light ----------------------------------------------------------------------------------------
 
     def clamped(self, paths: Paths, contribution: Contribution, slot: Ints, arriving: Floats) -> Floats:
-        """Return light `arriving` (3, k) at slots (k,), its indirect part scaled down to the clamp.
-
-        A path of several branches is clamped like one of a sample of its own. What is not finite stays so.
-        """
+        """Return light `arriving` (3, k) at slots (k,) as it is to be added."""
         if self._clamp is None or paths.depth is None:
             return arriving
-        limit, (x, y, z) = f4(self._clamp * self._share), arriving * f4(1 / 3)
-        mean = x + y + z
-        bright = (mean > limit) & (mean < np.inf) & ~_is_direct(paths.depth, contribution)
-        lanes = np.flatnonzero(bright)
-        if not lanes.size:
-            return arriving
-        left = arriving.copy()
-        left[:, lanes] *= limit / mean.take(lanes)
-        removed = arriving.take(lanes, 1) - left.take(lanes, 1)
-        add_to_slots(self._light[CLAMPED], slot.take(lanes), removed)
-        return left
+        return self._clamp.clamped(paths, contribution, slot, arriving, self._share)
 
     def record_light(
         self, picture: Floats, paths: Paths, contribution: Contribution, slot: Ints, arriving: Floats
@@ -240,25 +220,15 @@ class SampleRecorder(PathRecorder):
             self._picture = picture
         if self._picture is not picture:
             self._picture = np.empty(0, f4)  # no integrator returns this
-        if (
-            "direct" in self._light
-            and paths.depth is not None
-            and (paths.depth != BounceDepth.INDIRECT).any()
-        ):
-            self._add("direct", np.flatnonzero(_is_direct(paths.depth, contribution)), slot, arriving)
+        if self._direct is not None and paths.depth is not None:
+            self._direct.record(paths, contribution, slot, arriving)
         for each in self._divided:
             each.record(paths, contribution, slot, arriving)
 
     def record_background(self, slot: Ints, color: Floats) -> None:
         """Record what has arrived of a background, (3, k), and has been added to slots (k,)."""
-        if "direct" in self._light:
-            self._light["direct"][:, slot] += color
-
-    def _add(self, name: str, lanes: Ints, slot: Ints, arriving: Floats) -> None:
-        if lanes.size == slot.size:
-            add_to_slots(self._light[name], slot, arriving)
-        elif lanes.size:
-            add_to_slots(self._light[name], slot.take(lanes), take(arriving, lanes))
+        if self._direct is not None:
+            self._direct.record_background(slot, color)
 
     # --- The result -----------------------------------------------------------------------------------
 
@@ -333,83 +303,6 @@ class SampleRecorder(PathRecorder):
                 )
 
 
-class LightByGroup:
-    """The light of each group, (3, n) for n samples.
-
-    Parameters
-    ----------
-    groups
-        The groups.
-    n
-        Samples of the wave.
-    """
-
-    def __init__(self, groups: LightGroups[Any], n: int) -> None:
-        self.groups, self.light = groups, np.zeros((len(groups.names), 3, n), f4)
-
-    def items(self) -> Iterator[tuple[Any, Floats]]:
-        """Return the names of the groups, and their light (3, n)."""
-        return zip(self.groups.names, self.light, strict=True)
-
-    def record(self, paths: Paths, contribution: Contribution, slot: Ints, arriving: Floats) -> None:
-        """Record light (3, k) of slots (k,); that of a mixed environment is divided among its groups."""
-        groups = self.groups
-        group = groups.of_light.take(contribution.light)
-        toward = contribution.wi
-        if toward is None and groups.need_directions:
-            toward = take(paths.direction, contribution.lanes)
-        if groups.patches is not None:
-            assert toward is not None
-            group = np.where(group == PATCHED, groups.patches.number(toward), group)
-        known = np.flatnonzero(group >= 0)
-        if known.size == slot.size:
-            self._add(group, slot, arriving)
-        elif known.size:
-            self._add(group.take(known), slot.take(known), take(arriving, known))
-        mixed = np.flatnonzero(group < 0)
-        if mixed.size:
-            assert toward is not None
-            for name, part in groups.parts_of_environment(take(toward, mixed)):
-                light = self.light[groups.names.index(name)]
-                add_to_slots(light, slot.take(mixed), take(arriving, mixed) * part)
-
-    def _add(self, group: Ints, slot: Ints, arriving: Floats) -> None:
-        count, channels, n = self.light.shape
-        sums = self.light.reshape(count * channels * n)
-        for channel, values in enumerate(arriving):
-            np.add.at(sums, (group * channels + channel) * n + slot, values)
-
-
-class Coverage:
-    """Which of the names of a scene's shapes each sample of a wave sees first.
-
-    Parameters
-    ----------
-    scene
-        The scene.
-    n
-        Samples of the wave.
-    """
-
-    def __init__(self, scene: CompiledScene, n: int) -> None:
-        self._names = tuple(dict.fromkeys(scene.shape_names))
-        numbers = {name: number for number, name in enumerate(self._names)}
-        self._of_shape = np.array([numbers[name] for name in scene.shape_names], np.intp)
-        self._seen = np.full(n, -1, np.intp)
-
-    def record(self, scene: CompiledScene, paths: Paths, hits: Hits) -> None:
-        """Record the first surfaces of paths."""
-        found = hits.found
-        self._seen[take(paths.slot, found)] = self._of_shape.take(scene.shape_numbers.of(hits.take(found)))
-
-    def counts(self, samples: int, dropped: Ints) -> Iterator[tuple[str, Ints]]:
-        """Yield each AOV, and how many samples of each pixel (k,) see a shape of that name."""
-        self._seen[dropped] = -1
-        seen = self._seen.reshape(samples, -1)
-        for number, name in enumerate(self._names):
-            yield f"coverage.{name}", (seen == number).sum(0, dtype=np.int32)
-
-
 def recorded_aovs(wanted: Sequence[str], scene: CompiledScene) -> tuple[str, ...]:
     """Return the AOVs that recorders of a scene return, those with a key by it."""
     names: list[str] = []
@@ -428,17 +321,3 @@ def _opacity(paths: Paths, hits: Hits) -> Floats:
     red, green, blue = paths.throughput
     left = np.minimum((red + green + blue) / f4(3), f4(2))
     return np.where(hits.prim == -1, f4(1) - left, f4(1))
-
-
-def _is_direct(depth: Bytes, contribution: Contribution) -> Bools:
-    """Return a mask (k,) of the contributions that count for the AOV "direct"."""
-    at = take(depth, contribution.lanes)
-    return at == BounceDepth.CAMERA if contribution.sampled else at <= BounceDepth.DIRECT
-
-
-def _after(depth: Bytes, specular: Bools) -> Bytes:
-    """Return `Paths.depth` (n,) after another scattering, which is specular (n,) or not."""
-    n = depth.size
-    if n and not (depth.strides[0] or specular.strides[0]):  # alike on all lanes
-        return broadcast(_after(depth[:1].copy(), specular[:1].copy())[0], n)
-    return DEPTH_AFTER[depth, specular.view(np.uint8)]
