@@ -116,7 +116,7 @@ def passes_until_clean(film: Film, spp: int, limit: float, begun: Pass | None = 
 
     It is when the mean error of lit pixels is at most `limit`. All of them count, also those of heavy tails,
     whose few bright samples a denoiser smears; but each by its error, as eyes see it, not by its square.
-    docs/choices.md has the figures that tell the limit.
+    docs/record/choices.md has the figures that tell the limit.
 
     Parameters
     ----------

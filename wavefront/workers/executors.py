@@ -1,10 +1,10 @@
 """Executors: the contract of workers, the table of who has them, and which of these suit a render.
 
 NumPy lets go of Python's global lock inside its loops, but between two of them every thread must take
-it again, and waiting for it costs more than the loops win: two threads trace 1.4 times as fast as one,
-two processes 1.9 times (docs/performance.md). So where the system can fork, workers are processes.
-They share the scene's memory, which nobody writes, and cost some milliseconds to start. Elsewhere processes
-are spawned, and take about a second until they have imported NumPy and this package and read the scene.
+it again, and waiting for it costs more than the loops win (docs/performance.md has figures). So where the
+system can fork, workers are processes. They share the scene's memory, which nobody writes, and cost some
+milliseconds to start. Elsewhere processes are spawned, and take about a second until they have imported
+NumPy and this package and read the scene.
 """
 
 from __future__ import annotations
