@@ -66,14 +66,28 @@ def test_a_white_ball_in_a_white_sky_is_white() -> None:
 def test_no_light_gets_through(thickness) -> None:
     """Of a lamp inside of a box, or a thin case, whose normals are as round as can be."""
     box = trimesh.creation.box((1, thickness, 1))
-    normals = box.vertices / np.abs(box.vertices)
-    case = wf.Mesh(box.vertices, box.faces, normals=normals, material=wf.Diffuse(0.8))
+    outwards = np.sign(box.vertices)[box.faces].reshape(-1, 3)
+    normals = outwards + np.repeat(box.face_normals, 3, 0) * 0.45  # 44.3° from that of the face
+    faces = np.arange(len(normals)).reshape(-1, 3)
+    case = wf.Mesh(box.vertices[box.faces].reshape(-1, 3), faces, normals=normals, material=wf.Diffuse(0.8))
     lamp = wf.Sphere((0, 0, 0), 0.3 * thickness, emission=50)
     camera = wf.Camera.look_at((2, 1.5, 3), (0, 0, 0), fov=35, size=(48, 48))
     far = wf.PointLight((0, 0, -9), 1e-9)
     for shapes in ([case, lamp], [wf.Instance(case, np.diag([-1.0, 1, 1, 1])), lamp]):
         image = wf.render(wf.Scene(shapes, [far], camera), **{**FAST, "spp": 16})
         assert image.rgb.max() < 1e-6
+
+
+@pytest.mark.parametrize("degrees", [44.0, 46.0])
+def test_boxes_are_not_round(degrees) -> None:
+    """The least that is: normals of a box lean by 54.7 degrees."""
+    lean = np.tan(np.radians(degrees))
+    roof = [[1, 0, 0], [-1, 1, 0], [-1, -1, 0]]
+    mesh = wf.Mesh(roof, [[0, 1, 2]], normals=[[lean, 0, 1], [0, 0, 1], [0, 0, 1]])
+    assert (compiled(mesh).program.find(ShadowTerminator) is not None) == (degrees < 45)
+    box = trimesh.creation.box((1, 1, 1))
+    cube = wf.Mesh(box.vertices, box.faces, normals=box.vertices)
+    assert compiled(cube).program.find(ShadowTerminator) is None
 
 
 def compiled(shape):
@@ -119,7 +133,7 @@ def test_heights_are_above_the_planes_of_vertices() -> None:
     heights = heights_of(corners, (tilted, ng, ng), ng)
     np.testing.assert_allclose(heights[:, 0], [1.2, 0, 0, 0, 0, 0])
     assert not heights_of(corners, (ng, ng, ng), ng).any()
-    for cosine, some in ((0.501, True), (0.499, False)):  # of the normal that leans most
+    for cosine, some in ((0.708, True), (0.706, False)):  # of the normal that leans most
         leaning = np.array([[np.sqrt(1 - cosine**2)], [0], [cosine]], np.float32)
         assert heights_of(corners, (leaning, ng, ng), ng).any() == some
 

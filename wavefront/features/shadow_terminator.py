@@ -22,7 +22,9 @@ from ..compile.scene import CompiledScene
 from ..stages.interaction import Surfaces, at_corners
 from ..stages.shade import Shading
 
-LEAST_COSINE = f4(0.5)  # of normals at vertices with that of the triangle
+# of normals at vertices with that of the triangle: those of a box lean by 55°, and a round surface for them
+# would bulge through what is beside it
+LEAST_COSINE = f4(0.7071)
 
 
 class RoundSurfaces(Surfaces):
