@@ -6,6 +6,7 @@ Their numbers are those of the JSON, unrounded.
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -19,6 +20,7 @@ from ...textures.parameter import MAX_INDEX
 from ..description.appearance import F0, MaterialSpec, build_material
 from ..description.computed import FLIP, Computed
 from ..description.numbers import SHOWN, floats, shown
+from ..description.parameters import Parameter, fill
 from ..sources import GRAY
 from .compression import DRACO, MESHOPT
 from .document import OF_CANDELA, Document
@@ -181,11 +183,29 @@ class _Reader:
 
     def _extended(self, extensions: dict[str, Any]) -> None:
         """Read the extensions of metallic-roughness."""
-        for name, read in EXTENSIONS.items():
+        for name, rows in EXTENSIONS.items():
             if extensions.get(name) is not None:
                 with self._document.part(f"{self._where}: {name}"):
-                    read(self, extensions[name])
+                    self._fill(extensions[name], rows)
+                    if name in MORE:
+                        MORE[name](self, extensions[name])
         self._lost += [name for name in extensions if name not in KNOWN]
+
+    def _fill(self, group: dict[str, Any], rows: tuple[Parameter, ...]) -> None:
+        """Read the parameters of a table."""
+        fill(self._wanted, rows, partial(self._factor, group), partial(self._varying, group))
+
+    def _factor(self, group: dict[str, Any], row: Parameter) -> Any:
+        """Return a number or a color (3,)."""
+        if np.ndim(row.default):
+            return self._color(group, row.theirs, list(row.default), row.high)
+        return self._number(group, row.theirs, row.default, row.high)
+
+    def _varying(self, group: dict[str, Any], row: Parameter, factor: Any) -> Texture | None:
+        """Return the texture that a factor multiplies, None without one; it is not read where that is 0."""
+        if not np.any(factor):
+            return None
+        return self._texture(group, row.image, srgb=row.channel is None, channel=row.channel, scale=factor)
 
     def _number(self, group: dict[str, Any], key: str, default: float, high: float = 1.0) -> float:
         return float(self._numbers(group, key, [default], high)[0])
@@ -211,24 +231,12 @@ class _Reader:
             return self._materials.texture(group[key], place, instead, **arguments)
         return None if instead is None else Texture(instead, **arguments)
 
-    def _scalar(self, group: dict[str, Any], factor: str, texture: str, channel: int, default: float) -> Any:
-        """Return a factor, or the texture that it scales."""
-        value = self._number(group, factor, default)
-        found = self._texture(group, texture, srgb=False, channel=channel, scale=value) if value else None
-        return value if found is None else found
-
-    def _want(self, name: str, value: Any, neutral: float) -> None:
-        if isinstance(value, Texture) or value != neutral:
-            self._wanted[name] = value
-
     def _metallic_roughness(self, group: dict[str, Any]) -> None:
         factor = self._color(group, "baseColorFactor", [1.0, 1.0, 1.0, 1.0])
         base = self._texture(group, "baseColorTexture", GRAY, scale=factor[:3])
         self._wanted["base_color"] = factor[:3] if base is None else base
         self._alpha(group, "baseColorTexture", float(factor[3]), base)
-        metallic = self._scalar(group, "metallicFactor", "metallicRoughnessTexture", 2, 1.0)
-        self._want("metallic", metallic, 0.0)
-        self._wanted["roughness"] = self._scalar(group, "roughnessFactor", "metallicRoughnessTexture", 1, 1.0)
+        self._fill(group, METALLIC_ROUGHNESS)
 
     def _specular_glossiness(self, group: dict[str, Any]) -> None:
         """Read the parameters of KHR_materials_pbrSpecularGlossiness, which replace metallic-roughness.
@@ -272,9 +280,8 @@ class _Reader:
         if base is not None and base.has_alpha:
             alpha = self._texture(group, key, srgb=False, channel=3, scale=factor)
         self._alpha_given = alpha
-        self._want("alpha", alpha, 1.0)
-        if mode == "MASK" and "alpha" in self._wanted:
-            self._wanted["alpha_cutoff"] = self._cutoff
+        if isinstance(alpha, Texture) or alpha != 1:
+            self._wanted |= {"alpha": alpha} | ({"alpha_cutoff": self._cutoff} if mode == "MASK" else {})
 
     def _normal_map(self) -> NormalMap | None:
         if "occlusionTexture" in self._item:
@@ -288,33 +295,24 @@ class _Reader:
             return NormalMap(texture, scale)
         return None
 
-    def _ior(self, group: dict[str, Any]) -> None:
-        ior = self._number(group, "ior", 1.5, high=MAX_INDEX)
-        if ior < 1:  # 0 means an infinite index: everything is reflected
-            self._lost.append(f"ior {ior:g}")
-        else:
-            self._want("ior", ior, 1.5)
+    def _index(self, group: dict[str, Any]) -> None:
+        if self._wanted.get("ior", 1.5) < 1:  # 0 means an infinite index: everything is reflected
+            self._lost.append(f"ior {self._wanted.pop('ior'):g}")
 
-    def _transmission(self, group: dict[str, Any]) -> None:
-        part = self._scalar(group, "transmissionFactor", "transmissionTexture", 0, 0.0)
-        self._want("transmission", part, 0.0)
+    def _wall(self, group: dict[str, Any]) -> None:
+        """Make what light passes thin, unless it has a volume."""
         volume = self._item["extensions"].get("KHR_materials_volume")
         thick = volume is not None and self._number(volume, "thicknessFactor", 0.0, high=np.inf) > 0
         if "transmission" in self._wanted and not thick:
             self._wanted["thin"] = True
 
-    def _clearcoat(self, group: dict[str, Any]) -> None:
-        self._want("clearcoat", self._scalar(group, "clearcoatFactor", "clearcoatTexture", 0, 0.0), 0.0)
-        if "clearcoat" not in self._wanted:
-            return
-        rough = self._scalar(group, "clearcoatRoughnessFactor", "clearcoatRoughnessTexture", 1, 0.0)
-        self._wanted["clearcoat_roughness"] = rough
-        if "clearcoatNormalTexture" in group:
+    def _coat(self, group: dict[str, Any]) -> None:
+        if "clearcoat" in self._wanted and "clearcoatNormalTexture" in group:
             self._lost.append("clearcoatNormalTexture")
 
     def _anisotropy(self, group: dict[str, Any]) -> None:
-        strength = self._scalar(group, "anisotropyStrength", "anisotropyTexture", 2, 0.0)
-        if not isinstance(strength, Texture) and strength == 0:
+        strength = self._wanted.pop("anisotropy", None)
+        if strength is None:
             return
         where = f"{self._where}.anisotropyRotation"
         degrees = np.degrees(floats(where, [group.get("anisotropyRotation", 0.0)], 1)[0])
@@ -329,23 +327,9 @@ class _Reader:
         else:
             self._wanted["roughness"] = float(np.sqrt(across**2 + (1 - across**2) * strength**2))
 
-    def _sheen(self, group: dict[str, Any]) -> None:
-        factor = self._color(group, "sheenColorFactor", [0.0, 0.0, 0.0])
-        if not factor.any():
-            return
-        texture = self._texture(group, "sheenColorTexture", scale=factor)
-        self._wanted["sheen"] = 1.0
-        self._wanted["sheen_color"] = factor if texture is None else texture
-        self._wanted["sheen_roughness"] = self._scalar(
-            group, "sheenRoughnessFactor", "sheenRoughnessTexture", 3, 0.0
-        )
-
-    def _specular(self, group: dict[str, Any]) -> None:
-        self._want("specular", self._scalar(group, "specularFactor", "specularTexture", 3, 1.0), 1.0)
-        factor = self._color(group, "specularColorFactor", [1.0, 1.0, 1.0], high=FLOAT32_MAX)
-        texture = self._texture(group, "specularColorTexture", scale=factor)
-        if texture is not None or (factor != 1).any():
-            self._wanted["specular_color"] = factor if texture is None else texture
+    def _cloth(self, group: dict[str, Any]) -> None:
+        if "sheen_color" in self._wanted:
+            self._wanted["sheen"] = 1.0
 
     def _iridescence(self, group: dict[str, Any]) -> None:
         factor = self._number(group, "iridescenceFactor", 0.0)
@@ -357,12 +341,9 @@ class _Reader:
         thin = self._number(group, "iridescenceThicknessMinimum", 100.0, high=1e5)
         spread: dict[str, Any] = {"srgb": False, "channel": 1, "scale": thick - thin, "offset": thin}
         texture = self._texture(group, "iridescenceThicknessTexture", **spread)
-        self._want("film_thickness", thick if texture is None else texture, 0.0)
-        if "film_thickness" in self._wanted:
+        if texture is not None or thick:
+            self._wanted["film_thickness"] = thick if texture is None else texture
             self._wanted["film_ior"] = self._number(group, "iridescenceIor", 1.3, high=MAX_INDEX)
-
-    def _dispersion(self, group: dict[str, Any]) -> None:
-        self._want("dispersion", self._number(group, "dispersion", 0.0, high=np.inf), 0.0)
 
     def _volume(self, group: dict[str, Any]) -> None:
         """Beer–Lambert: `attenuationColor` is the transmittance over `attenuationDistance`."""
@@ -409,16 +390,47 @@ def direction(vectors: Any, degrees: Any) -> Any:
     return arctan2(f4(2) * green - f4(1), f4(2) * red - f4(1)) * f4(180 / np.pi) + degrees
 
 
-# extensions of metallic-roughness, in the order in which they are read
-EXTENSIONS: dict[str, Callable[[_Reader, dict[str, Any]], None]] = {
-    "KHR_materials_ior": _Reader._ior,
-    "KHR_materials_transmission": _Reader._transmission,
-    "KHR_materials_clearcoat": _Reader._clearcoat,
-    "KHR_materials_sheen": _Reader._sheen,
+def _textured(ours: str, theirs: str, default: Any, channel: int | None = None, **more: Any) -> Parameter:
+    """Return a parameter with the names that most have: `...Factor` and `...Texture`."""
+    return Parameter(ours, f"{theirs}Factor", default, f"{theirs}Texture", channel, **more)
+
+
+BLACK, WHITE = (0.0, 0.0, 0.0), (1.0, 1.0, 1.0)
+METALLIC_ROUGHNESS = (
+    Parameter("metallic", "metallicFactor", 1.0, "metallicRoughnessTexture", 2, neutral=0.0),
+    Parameter("roughness", "roughnessFactor", 1.0, "metallicRoughnessTexture", 1),
+)
+# extensions of metallic-roughness, in the order in which they are read, and their parameters
+EXTENSIONS: dict[str, tuple[Parameter, ...]] = {
+    "KHR_materials_ior": (Parameter("ior", "ior", 1.5, neutral=1.5, high=MAX_INDEX),),
+    "KHR_materials_transmission": (_textured("transmission", "transmission", 0.0, 0, neutral=0.0),),
+    "KHR_materials_clearcoat": (
+        _textured("clearcoat", "clearcoat", 0.0, 0, neutral=0.0),
+        _textured("clearcoat_roughness", "clearcoatRoughness", 0.0, 1, beside="clearcoat"),
+    ),
+    "KHR_materials_sheen": (
+        _textured("sheen_color", "sheenColor", BLACK, neutral=0.0),
+        _textured("sheen_roughness", "sheenRoughness", 0.0, 3, beside="sheen_color"),
+    ),
+    "KHR_materials_anisotropy": (
+        Parameter("anisotropy", "anisotropyStrength", 0.0, "anisotropyTexture", 2, neutral=0.0),
+    ),
+    "KHR_materials_specular": (
+        _textured("specular", "specular", 1.0, 3, neutral=1.0),
+        _textured("specular_color", "specularColor", WHITE, neutral=1.0, high=FLOAT32_MAX),
+    ),
+    "KHR_materials_iridescence": (),
+    "KHR_materials_dispersion": (Parameter("dispersion", "dispersion", 0.0, neutral=0.0, high=np.inf),),
+    "KHR_materials_volume": (),
+}
+# what is read of an extension after its parameters
+MORE: dict[str, Callable[[_Reader, dict[str, Any]], None]] = {
+    "KHR_materials_ior": _Reader._index,
+    "KHR_materials_transmission": _Reader._wall,
+    "KHR_materials_clearcoat": _Reader._coat,
+    "KHR_materials_sheen": _Reader._cloth,
     "KHR_materials_anisotropy": _Reader._anisotropy,
-    "KHR_materials_specular": _Reader._specular,
     "KHR_materials_iridescence": _Reader._iridescence,
-    "KHR_materials_dispersion": _Reader._dispersion,
     "KHR_materials_volume": _Reader._volume,
 }
 # extensions whose properties are all read here or in gltf.py
