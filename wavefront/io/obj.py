@@ -28,7 +28,7 @@ from .polygons import fans_by_size, triangulate, turned_fans
 from .repair import RawMesh, Table
 from .sources import LoadLimits
 from .text_lines import NUMBER, check_lines, words
-from .trimesh.loading import geometries
+from .trimesh_library import geometries
 
 UNSEEN = ("", "o", "g")  # keywords without an effect on the look of a surface
 OFF = ("off", "0")  # values that switch a keyword off

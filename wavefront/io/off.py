@@ -16,7 +16,7 @@ from .ply.header import Element, Property
 from .ply.meshes import NAME, bad_rows, faces_of_rows, note_damage
 from .ply.rows import Rows, rows_of_lines
 from .repair import RawMesh
-from .trimesh.loading import geometries
+from .trimesh_library import geometries
 
 HEADERS = {"OFF": [], "COFF": ["colors of vertices"], "NOFF": ["normals"], "STOFF": ["texture coordinates"]}
 VERTEX = [Property(axis, "f8") for axis in "xyz"]

@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 import os
-import re
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, TypeAlias
 
-from ..core.errors import SceneError, passed_limit
+from ..core.errors import SceneError
 from ..core.files import decode_text, extension_of
 from ..core.registry import Registry
 from ..scene import Scene
@@ -17,7 +16,7 @@ from ..shapes.smoothing import AUTO
 from . import mtl, obj, off, stl, threemf
 from .clouds import cloud
 from .dae import document as dae
-from .description.appearance import MaterialSpec, assign_material, from_srgb
+from .description.appearance import assign_material, from_srgb
 from .description.contents import Contents
 from .gltf import scene as gltf
 from .gltf.materials import GltfMaterials
@@ -92,7 +91,7 @@ def _read_obj(files: SceneFiles, data: bytes, options: LoadOptions) -> Contents:
         codes = None if parsed.points.shape[1] < 6 else from_srgb(parsed.points[:, 3:])
         points = cloud(losses, parsed.points[:, :3], codes)
         return Contents(shapes=[] if points is None else [points])
-    specs = _libraries(files, parsed.libraries) if materials else {}
+    specs = mtl.libraries(files, parsed.libraries) if materials else {}
     for raw in parsed.raws:
         raw.colors = None if raw.colors is None else from_srgb(raw.colors)
         if materials and not assign_material(raw, specs.get(raw.name)):
@@ -103,36 +102,6 @@ def _read_obj(files: SceneFiles, data: bytes, options: LoadOptions) -> Contents:
     if materials and absent and not parsed.libraries:
         losses.note(f"names no material file for its materials {absent}", done="gray in their place")
     return Contents.once(parsed.raws)
-
-
-def _libraries(files: SceneFiles, libraries: list[str]) -> dict[str, MaterialSpec]:
-    """Read the material files; note missing ones."""
-    specs: dict[str, MaterialSpec] = {}
-    names = (name for line in libraries for name in _names(files, line))
-    for library in dict.fromkeys(names):
-        try:
-            file = files.find(library)
-            found = os.path.exists(file)  # also False for invalid names
-        except SceneError as error:
-            if passed_limit(error):
-                raise
-            files.losses.note(f"material file {library!r}: {files.brief(error)}", done="left out")
-            continue
-        if not found:
-            files.losses.note(f"material file {library!r}", value="missing", done="left out")
-            continue
-        entries = mtl.parse(file, decode_text(files.read(file)), files.losses, files)
-        specs.update(mtl.specs(entries, files.losses))
-    return specs
-
-
-def _names(files: SceneFiles, line: str) -> list[str]:
-    """Return the material files of a line: one, whose name may contain blanks or be quoted, or several."""
-    line = line.strip('"')
-    beside = os.path.join(os.path.dirname(files.name), line)
-    parts = re.split(r"(?<=\.mtl)\s+", line.strip(), flags=re.IGNORECASE)  # in linear time
-    several = [part for part in parts if part.lower().endswith(".mtl")]
-    return several if len(several) > 1 and not os.path.exists(beside) else [line]
 
 
 def _read_ply(files: SceneFiles, data: bytes, options: LoadOptions) -> Contents:

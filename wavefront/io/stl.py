@@ -13,7 +13,7 @@ from ..core.plural import plural
 from .losses import Losses
 from .repair import RawMesh, wide
 from .text_lines import NUMBER, check_lines, words
-from .trimesh.loading import geometries
+from .trimesh_library import geometries
 
 COLORS = (b"COLOR=", b"MATERIAL=")  # keywords that Materialize Magics writes into the header
 WORDS = ("", "facet", "outer", "endloop", "endfacet")  # first words of lines that say nothing further

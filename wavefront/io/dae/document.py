@@ -15,7 +15,7 @@ from ...core.errors import SceneError
 from ..description.contents import Contents
 from ..description.placing import meters
 from ..sources import SceneFiles
-from ..trimesh.loading import typed_errors
+from ..trimesh_library import typed_errors
 from ..xml_checks import check_expanded, look_through, total
 from .mending import is_doubtful, mended
 from .meshes import DaeMeshes

@@ -17,9 +17,9 @@ from ..description.placing import Places
 from ..polygons import triangulate, with_holes
 from ..repair import RawMesh, Table
 from ..sources import SceneFiles
-from ..trimesh.library import import_trimesh
-from ..trimesh.loading import Images, typed_errors
-from ..trimesh.objects import material_spec
+from ..trimesh_library import import_trimesh, typed_errors
+from ..trimesh_materials import material_spec
+from .images import Images
 
 NONE = np.zeros((0, 3), np.intp)  # triangles
 

@@ -24,6 +24,13 @@ class Parameter(NamedTuple):
     beside: str = ""  # another parameter, by our name, without which this one has no effect
 
 
+# of glTF, and of what trimesh makes of glTF and COLLADA
+METALLIC_ROUGHNESS = (
+    Parameter("metallic", "metallicFactor", 1.0, "metallicRoughnessTexture", 2, neutral=0.0),
+    Parameter("roughness", "roughnessFactor", 1.0, "metallicRoughnessTexture", 1),
+)
+
+
 def fill(
     wanted: dict[str, Any],
     rows: Iterable[Parameter],

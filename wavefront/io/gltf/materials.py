@@ -20,7 +20,7 @@ from ...textures.parameter import MAX_INDEX
 from ..description.appearance import F0, MaterialSpec, build_material
 from ..description.computed import FLIP, Computed
 from ..description.numbers import SHOWN, floats, shown
-from ..description.parameters import Parameter, fill
+from ..description.parameters import METALLIC_ROUGHNESS, Parameter, fill
 from ..sources import GRAY
 from .compression import DRACO, MESHOPT
 from .document import OF_CANDELA, Document
@@ -396,10 +396,6 @@ def _textured(ours: str, theirs: str, default: Any, channel: int | None = None, 
 
 
 BLACK, WHITE = (0.0, 0.0, 0.0), (1.0, 1.0, 1.0)
-METALLIC_ROUGHNESS = (
-    Parameter("metallic", "metallicFactor", 1.0, "metallicRoughnessTexture", 2, neutral=0.0),
-    Parameter("roughness", "roughnessFactor", 1.0, "metallicRoughnessTexture", 1),
-)
 # extensions of metallic-roughness, in the order in which they are read, and their parameters
 EXTENSIONS: dict[str, tuple[Parameter, ...]] = {
     "KHR_materials_ior": (Parameter("ior", "ior", 1.5, neutral=1.5, high=MAX_INDEX),),

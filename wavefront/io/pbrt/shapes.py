@@ -20,7 +20,7 @@ from ..description.entity import Entity
 from ..description.placing import facing, in_range, moved_raw
 from ..repair import RawMesh, build, existing, with_corners_apart
 from ..surfaces import RINGS, SIDES, over_square
-from ..trimesh.library import import_trimesh
+from ..trimesh_library import import_trimesh
 from .entities import Job, converts, unsupported
 from .mappings import Mapped, Mapping
 from .materials import material_of

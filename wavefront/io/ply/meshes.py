@@ -12,8 +12,10 @@ from typing import NamedTuple
 import numpy as np
 
 from ...arrays.vec import Bools, Doubles, Ints
+from ...bsdfs import Diffuse
 from ...core.plural import plural
-from .. import mtl
+from ...materials import Material
+from ...textures.image import Texture
 from ..clouds import cloud
 from ..description.appearance import MaterialSpec, assign_material, from_srgb, is_faint
 from ..description.contents import Contents
@@ -230,9 +232,6 @@ def _textured(files: SceneFiles, textures: list[str]) -> MaterialSpec | None:
     if len(textures) > 1:
         files.losses.note("several textures", done=f"{reference!r} is taken for all faces")
     image = files.picture(reference, instead=GRAY)
-    if image is GRAY:  # as without a material
+    if image is None or image is GRAY:  # as without a material
         return None
-    entry = mtl.Entry(files.name, "", files=files, losses=files.losses)
-    entry.images["map_kd"] = image
-    entry.lines["map_kd"] = ("texture", 0, reference)
-    return mtl.spec(entry)
+    return MaterialSpec(Material(Diffuse(Texture(image)), alpha=1.0))

@@ -8,21 +8,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...arrays.vec import f4
-from ...bsdfs import Diffuse
-from ...codecs.raster import codes_of
-from ...core.errors import SceneError, printable
-from ...materials import Material
+from ...core.errors import SceneError
 from ...shapes.transform import Matrix
-from ...textures.image import StoredImage, Texture
-from ...textures.normal_map import NormalMap
-from .. import mtl
-from ..description.appearance import MaterialSpec, assign_material, build_material, from_srgb, is_faint
+from ..description.appearance import MaterialSpec, assign_material, from_srgb, is_faint
 from ..description.contents import Contents
 from ..description.placing import Places
 from ..losses import Losses
-from ..mtl import MATTE
 from ..repair import RawMesh, Table, with_face_colors
-from .library import import_trimesh
+from ..trimesh_library import import_trimesh
+from ..trimesh_materials import is_blank, material_spec
 
 if TYPE_CHECKING:
     import trimesh
@@ -119,28 +113,11 @@ class _Visuals:
         self._losses.note(what, f"mesh {raw.name!r}")
 
     def _spec(self, material: Any, bare: bool) -> MaterialSpec | None:
-        if material is None or _is_blank(material):
+        if material is None or is_blank(material):
             return None
         if id(material) not in self._specs:
             self._specs[id(material)] = material_spec(material, self._losses, bare)
         return self._specs[id(material)]
-
-
-def material_spec(material: Any, losses: Losses, bare: bool = False) -> MaterialSpec:
-    """Return the material of a trimesh `PBRMaterial` or `SimpleMaterial`.
-
-    If `bare`, the colors and the exponent of the highlight count only if the material has its own `Kd`, `Ks`
-    or `Ns`. Otherwise those that trimesh would write into a file count.
-    """
-    if hasattr(material, "baseColorFactor"):
-        found = _pbr(material)
-    elif hasattr(material, "diffuse"):
-        found = _simple(material, f"trimesh material {material.name!r}", bare, losses)
-    else:
-        found = MaterialSpec(Material(Diffuse(MATTE)), lost=[type(material).__name__])
-    name = getattr(material, "name", None)
-    found.material.name = printable(str(name)) if name else None
-    return found
 
 
 def _vertex_colors(mesh: Any) -> Table | None:
@@ -214,85 +191,3 @@ def _ply_has_colors(mesh: Any, element: str) -> bool:
     """
     raw = mesh.metadata.get("_ply_raw", {}).get(element, {})
     return "red" in raw.get("properties", {})
-
-
-def _is_blank(material: Any) -> bool:
-    """Return whether a material is trimesh's default for a mesh with only texture coordinates."""
-    image = getattr(material, "image", None)
-    plain = getattr(material, "kwargs", None) == {} and material.name in (None, "", "material_0")
-    return (
-        plain
-        and image is not None
-        and max(image.size) <= 2
-        and not np.ptp(codes_of(image), axis=(0, 1)).any()
-    )
-
-
-def _picture(image: Any) -> StoredImage:
-    """Return the stored values of a PIL image."""
-    return StoredImage(codes_of(image), "image")
-
-
-def _pbr(material: Any) -> MaterialSpec:
-    """Read glTF's model; trimesh rounds its colors to 8 bits, and they are linear."""
-    factor = np.ones(4) if material.baseColorFactor is None else np.asarray(material.baseColorFactor) / 255.0
-    wanted: dict[str, Any] = {"base_color": factor[:3]}
-    base = None if material.baseColorTexture is None else _picture(material.baseColorTexture)
-    if base is not None:
-        wanted["base_color"] = Texture(base, scale=factor[:3])
-    alpha: Any = None
-    cutoff = None
-    if material.alphaMode == "MASK":
-        cutoff = 0.5 if material.alphaCutoff is None else float(material.alphaCutoff)
-    if material.alphaMode in ("MASK", "BLEND"):
-        alpha = float(factor[3])
-        if base is not None and base.codes.shape[2] in (2, 4):
-            alpha = Texture(base, srgb=False, channel=3, scale=alpha)
-        if isinstance(alpha, Texture) or alpha != 1:
-            wanted |= {"alpha": alpha, "alpha_cutoff": cutoff}
-    metallic = 1.0 if material.metallicFactor is None else float(material.metallicFactor)
-    roughness = 1.0 if material.roughnessFactor is None else float(material.roughnessFactor)
-    both = None if material.metallicRoughnessTexture is None else _picture(material.metallicRoughnessTexture)
-    if metallic:
-        wanted["metallic"] = metallic if both is None else Texture(both, False, channel=2, scale=metallic)
-    wanted["roughness"] = roughness if both is None else Texture(both, False, channel=1, scale=roughness)
-    glow = np.zeros(3) if material.emissiveFactor is None else np.asarray(material.emissiveFactor, np.float64)
-    radiance: Any = glow if glow.any() else None
-    if radiance is not None and material.emissiveTexture is not None:
-        radiance = Texture(_picture(material.emissiveTexture), scale=glow)
-    normal_map = None
-    bumps = material.normalTexture  # trimesh does not keep its scale
-    if bumps is not None and bumps.size != (1, 1):  # which is even, or in place of a missing image
-        normal_map = NormalMap(Texture(_picture(bumps), False))
-    made, lost = build_material(wanted, normal_map)
-    occluded = ["occlusionTexture"] if material.occlusionTexture is not None else []
-    return MaterialSpec(made, radiance, bool(material.doubleSided), occluded + lost, alpha, cutoff)
-
-
-def _simple(material: Any, where: str, bare: bool, losses: Losses) -> MaterialSpec:
-    """Read an MTL material: trimesh keeps its lines as lists of words."""
-    entry = mtl.Entry(where, str(material.name or ""), losses=losses)
-    lines = {key: value for key, value in material.kwargs.items() if key != "name"}
-    if not bare:
-        plain = material.image is not None  # then a color that was not given is no factor of it
-        for key, codes in (("kd", material.diffuse), ("ks", material.specular)):
-            if plain and (np.asarray(codes)[:3] == INVENTED).all():
-                continue
-            lines.setdefault(key, [f"{code / 255:.8f}" for code in np.asarray(codes)[:3]])
-        lines.setdefault("ns", f"{material.glossiness:.8f}")
-    for key, value in lines.items():
-        words = value if isinstance(value, list | tuple | np.ndarray) else [value]
-        entry.lines[key.lower()] = (key, 0, " ".join(str(word) for word in words))
-    if material.image is not None:
-        entry.images["map_kd"] = _picture(material.image)
-        entry.lines["map_kd"] = ("map_kd", 0, "image")
-    # of the other images trimesh keeps only the names, without a folder
-    gone = [key for key in entry.lines if _is_map(key) and key not in entry.images]
-    gone = [entry.lines.pop(key)[0] for key in gone]
-    found = mtl.spec(entry)
-    found.lost = [*gone, *entry.unread(), *found.lost]
-    return found
-
-
-def _is_map(key: str) -> bool:
-    return key.startswith("map_") or key in mtl.BUMP_MAPS

@@ -1,9 +1,7 @@
-"""Loading files by trimesh: errors become SceneErrors; images are read only from the file's own folder."""
+"""The images of a COLLADA document, for trimesh, which reads its materials."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from contextlib import contextmanager
 from io import BytesIO
 from typing import Any
 
@@ -12,9 +10,7 @@ from numpy.typing import NDArray
 
 from ...codecs.encoding import to_codes
 from ...core.errors import SceneError
-from ...core.interrupt import repeated_ctrl_c
 from ..sources import GRAY, SceneFiles
-from .library import import_trimesh
 
 
 class Images:
@@ -54,29 +50,3 @@ def _as_png(codes: NDArray[Any]) -> bytes:
     out = BytesIO()
     Image.fromarray(codes[..., 0] if codes.shape[2] == 1 else codes).save(out, "PNG", compress_level=1)
     return out.getvalue()
-
-
-def geometries(name: str, kind: str, data: bytes) -> list[dict[str, Any]]:
-    """Return the meshes that trimesh's loader reads; a trimesh object would round their colors to 8 bits.
-
-    Raises
-    ------
-    SceneError
-        For any error of the loader but MemoryError.
-    """
-    mesh_loaders = import_trimesh().exchange.load.mesh_loaders
-    with typed_errors(name, kind):
-        found = mesh_loaders[kind](BytesIO(data))
-    return list(found["geometry"].values()) if "geometry" in found else [found]
-
-
-@contextmanager
-def typed_errors(name: str, kind: str) -> Iterator[None]:
-    """Convert any error of a loader but MemoryError to a SceneError; silence NumPy's warnings."""
-    try:
-        with np.errstate(all="ignore"), repeated_ctrl_c():  # some of them swallow it
-            yield
-    except (MemoryError, SceneError):
-        raise
-    except Exception as error:
-        raise SceneError(f"{name}: not a readable {kind} file: {error!r}") from error
