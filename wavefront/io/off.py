@@ -12,10 +12,8 @@ import numpy as np
 from ..core.errors import SceneError
 from ..core.files import decode_text
 from .losses import Losses
-from .ply.header import Element, Property
-from .ply.meshes import NAME, bad_rows, faces_of_rows, note_damage
-from .ply.rows import Rows, rows_of_lines
 from .repair import RawMesh
+from .rows import NAME, Element, Property, Rows, bad_rows, faces_of_rows, note_damage, rows_of_lines
 from .trimesh_library import geometries
 
 HEADERS = {"OFF": [], "COFF": ["colors of vertices"], "NOFF": ["normals"], "STOFF": ["texture coordinates"]}

@@ -22,6 +22,7 @@ from .gltf import scene as gltf
 from .gltf.materials import GltfMaterials
 from .losses import Losses
 from .ply import meshes as ply
+from .ply.attributes import ply_attributes
 from .repair import RawMesh
 from .sources import LoadLimits, PathLike, SceneFiles
 
@@ -164,8 +165,6 @@ def mesh_reader(files: SceneFiles) -> Callable[[Path], list[RawMesh]]:
         for raw in raws:
             raw.attributes = ply_attributes(parsed.rows, parsed.row)
         return raws
-
-    from .mitsuba.attributes import ply_attributes
 
     return read_meshes
 

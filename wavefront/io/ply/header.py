@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import re
-from dataclasses import dataclass, field
 from typing import NamedTuple
 
 from ...core.errors import SceneError
+from ..rows import Element, Property
 
 TYPES = {
     "char": "i1", "int8": "i1", "uchar": "u1", "uint8": "u1",
@@ -22,28 +22,6 @@ READ = {
     "face": {"vertex_index", "vertex_indices", "texcoord", "red", "green", "blue", "alpha"},
     "tristrips": {"vertex_index", "vertex_indices"},
 }  # fmt: skip
-
-
-class Property(NamedTuple):
-    """A property of an element, with the code of NumPy for its type."""
-
-    name: str
-    kind: str
-    length: str = ""  # of a list, that of its length
-
-    @property
-    def size(self) -> int:
-        """The bytes of one value."""
-        return int(self.kind[1])
-
-
-@dataclass
-class Element:
-    """One kind of element of the header."""
-
-    name: str
-    count: int  # rows, as the header says
-    properties: list[Property] = field(default_factory=list)
 
 
 class Header(NamedTuple):

@@ -11,22 +11,20 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ...arrays.vec import Bools, Doubles, Ints
+from ...arrays.vec import Doubles, Ints
 from ...bsdfs import Diffuse
-from ...core.plural import plural
 from ...materials import Material
 from ...textures.image import Texture
 from ..clouds import cloud
 from ..description.appearance import MaterialSpec, assign_material, from_srgb, is_faint
 from ..description.contents import Contents
 from ..losses import Losses
-from ..polygons import fans_by_size, triangulate
 from ..repair import RawMesh, Table, with_corners_apart
+from ..rows import NAME, NONE, Faces, Rows, bad_rows, faces_of_rows, note_damage, note_rows
 from ..sources import GRAY, SceneFiles
 from .header import RGB, read_header, unread
-from .rows import Rows, read_rows
+from .rows import read_rows
 
-NAME = "geometry_0"  # of the mesh
 UVS = (("texture_u", "texture_v"), ("u", "v"), ("s", "t"))  # names of texture coordinates of vertices
 
 
@@ -36,17 +34,6 @@ class Parsed(NamedTuple):
     contents: Contents
     rows: dict[str, Rows]
     row: Ints  # (m,) that of each triangle in `rows["face"]`
-
-
-class Faces(NamedTuple):
-    """Triangles of the faces of a file."""
-
-    triangles: Ints  # (m, 3) vertices
-    row: Ints  # (m,) of each
-    corner: Ints  # (m, 3) numbers of the corners, counted through all rows
-
-
-NONE = Faces(np.zeros((0, 3), np.intp), np.zeros(0, np.intp), np.zeros((0, 3), np.intp))
 
 
 def parse(files: SceneFiles, data: bytes, materials: bool) -> Parsed:
@@ -81,29 +68,6 @@ def parse(files: SceneFiles, data: bytes, materials: bool) -> Parsed:
     return Parsed(Contents.once([raw] if len(raw.faces) else []), rows, faces.row)
 
 
-def note_damage(losses: Losses, found: dict[str, Rows]) -> None:
-    """Note rows that are missing or damaged."""
-    for name, rows in found.items():
-        absent = rows.element.count - rows.count
-        if absent and rows.element.properties:
-            done = "missing, as the file ends before"
-            losses.note(f"the last {plural(absent, 'row')} of {name}", done=done)
-        note_rows(losses, rows, rows.bad, "with too few or malformed words")
-        note_rows(losses, rows, rows.long, "with more words", "these are not read")
-
-
-def note_rows(losses: Losses, rows: Rows, chosen: Bools | None, what: str, done: str = "left out") -> None:
-    """Note the chosen rows (count,), if there are any."""
-    if chosen is not None and chosen.any():
-        count = plural(int(chosen.sum()), f"row of {rows.element.name}", f"rows of {rows.element.name}")
-        losses.note(f"{count} {what}, first: {rows.place(int(chosen.argmax()))}", done=done)
-
-
-def bad_rows(rows: Rows) -> Bools:
-    """Return which rows (count,) lack something."""
-    return np.zeros(rows.count, np.bool_) if rows.bad is None else rows.bad
-
-
 def _faces(files: SceneFiles, rows: dict[str, Rows], points: Doubles) -> Faces:
     """Return the triangles of faces and strips."""
     parts = []
@@ -121,24 +85,6 @@ def _indices(rows: Rows) -> str | None:
     """Return the name of the list with the indices of vertices; None if there is none."""
     usual = [name for name in ("vertex_index", "vertex_indices") if name in rows.lists]
     return next(iter(usual or rows.lists), None)
-
-
-def faces_of_rows(losses: Losses, rows: Rows, named: str, points: Doubles) -> Faces:
-    """Return the triangles of the faces whose vertices are in a list of rows; damaged faces are noted."""
-    counts, values = rows.lists[named]
-    with np.errstate(all="ignore"):
-        corners = values.astype(np.intp)
-    inside = (corners == values) & (corners >= 0) & (corners < len(points))
-    row = np.repeat(np.arange(rows.count), counts)
-    lost, short = np.zeros(rows.count, np.bool_), counts < 3
-    lost[row[~inside]] = True
-    note_rows(losses, rows, short & ~bad_rows(rows), "with fewer than 3 corners")
-    note_rows(losses, rows, lost, f"with a vertex beyond the {len(points)}")
-    kept = np.flatnonzero(~(lost | short | bad_rows(rows)))
-    places = np.flatnonzero(np.isin(row, kept)) if len(kept) < rows.count else np.arange(len(row))
-    corner, polygon = triangulate(points, corners[places], counts[kept], fans_by_size)
-    corner = places[corner]
-    return Faces(corners[corner], kept[polygon], corner)
 
 
 def _of_strips(losses: Losses, rows: Rows, named: str, points: Doubles) -> Faces:

@@ -6,56 +6,16 @@ list, ends before that row.
 
 from __future__ import annotations
 
-from collections.abc import Iterable
-from dataclasses import dataclass, field
 from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ...arrays.vec import Bools, Doubles, Ints
-from ..text_lines import NUMBER
-from .header import Element, Header, Property
+from ...arrays.vec import Ints
+from ..rows import Element, Property, Rows, ranges, rows_of_lines
+from .header import Header
 
 BYTE_ORDERS: dict[str, Literal["little", "big"]] = {"<": "little", ">": "big"}
-
-
-@dataclass
-class Rows:
-    """The rows of an element that are there."""
-
-    element: Element
-    count: int
-    columns: dict[str, NDArray[Any]] = field(default_factory=dict)  # (count,), by the name of the property
-    lists: dict[str, tuple[Ints, NDArray[Any]]] = field(default_factory=dict)  # lengths (count,), all values
-    bad: Bools | None = None  # (count,) where a row lacks something
-    long: Bools | None = None  # (count,) where words follow that are not read
-    lines: Ints | None = None  # (count,) of a text
-
-    def place(self, row: Any) -> str:
-        """Return where a row is, for messages."""
-        return f"{self.element.name} {row}" if self.lines is None else f"line {self.lines[row]}"
-
-    def table(self, names: Iterable[str]) -> Doubles | None:
-        """Return columns (count, k), None if one is missing."""
-        found = [self.columns.get(name) for name in names]
-        there = [_as(column, "f8") for column in found if column is not None]
-        return np.stack(there, 1) if len(there) == len(found) else None
-
-    def units(self, names: Iterable[str]) -> Doubles | None:
-        """Return the same, where the largest whole number of a type stands for 1.
-
-        Larger types than two bytes often have bytes in them.
-        """
-        kinds = {each.name: each.kind for each in self.element.properties}
-        found = self.table(names := tuple(names))
-        if found is None:
-            return None
-        for i, name in enumerate(names):
-            if kinds[name][0] != "f":
-                byte = kinds[name] not in ("u1", "u2") and found[:, i].max(initial=0) <= 255
-                found[:, i] /= 255 if byte else np.iinfo(kinds[name]).max
-        return found
 
 
 def read_rows(header: Header, data: bytes) -> dict[str, Rows]:
@@ -75,52 +35,6 @@ def _text(header: Header, data: bytes) -> list[Rows]:
         rows.lines = own + header.lines + 1
         out.append(rows)
     return out
-
-
-def rows_of_lines(element: Element, lines: list[list[str]]) -> Rows:
-    """Return the rows of an element, each from the words of a line."""
-    widths = np.array([len(words) for words in lines], np.intp)
-    values = _numbers([word for words in lines for word in words])
-    end = np.cumsum(widths)
-    at, bad = end - widths, np.zeros(len(lines), np.bool_)
-    rows = Rows(element, len(lines), bad=bad)
-    padded = np.append(values, np.nan)
-    for each in element.properties:
-        found = np.where(at < end, padded[np.minimum(at, len(values))], np.nan)
-        bad |= at >= end
-        at = at + 1
-        if each.length:
-            whole = (found >= 0) & (found <= end - at) & (found == np.rint(found))
-            counts = np.where(whole, found, 0).astype(np.intp)
-            bad |= ~whole
-            rows.lists[each.name] = counts, values[_ranges(at, counts)]
-            at = at + counts
-        else:
-            rows.columns[each.name] = _as(found, "f4") if each.kind == "f4" else found
-    rows.long = (at < end) & ~bad
-    return rows
-
-
-def _as(values: NDArray[Any], kind: str) -> NDArray[Any]:
-    """Return values as numbers of a type; a signaling NaN is any NaN, and what is too large infinite."""
-    with np.errstate(all="ignore"):
-        return values.astype(kind)
-
-
-def _numbers(words: list[str]) -> Doubles:
-    """Return the numbers of words, NaN for those that are none."""
-    try:
-        if "_" not in "".join(words):
-            return np.fromiter(map(float, words), np.float64, len(words))
-    except ValueError:
-        pass
-    numbers = (float(word) if NUMBER.fullmatch(word) else np.nan for word in words)
-    return np.fromiter(numbers, np.float64, len(words))
-
-
-def _ranges(starts: Ints, counts: Ints) -> Ints:
-    """Return the numbers from each start on, as many as its count, one range after the other."""
-    return np.repeat(starts - np.cumsum(counts) + counts, counts) + np.arange(counts.sum())
 
 
 def _binary(header: Header, data: bytes) -> list[Rows]:
@@ -217,7 +131,7 @@ def _gathered(element: Element, data: bytes, order: str, at: Ints, lists: list[I
             begin = next(left)
             counts = values(begin - int(each.length[1]), each.length).astype(np.intp)
             at = begin + counts * each.size
-            places = np.repeat(begin, counts) + each.size * _ranges(np.zeros_like(counts), counts)
+            places = np.repeat(begin, counts) + each.size * ranges(np.zeros_like(counts), counts)
             rows.lists[each.name] = counts, values(places, each.kind)
         else:
             rows.columns[each.name] = values(at, each.kind)
