@@ -2,6 +2,7 @@
 
 import ast
 import sys
+from contextlib import contextmanager
 from pathlib import Path
 from types import ModuleType, SimpleNamespace
 
@@ -31,18 +32,25 @@ def tracer(changes=()):
     return module
 
 
+@contextmanager
+def imported_tracer(changes=()):
+    """Have `import tracer` give the tracer of the tutorial, with changes."""
+    before, sys.modules["tracer"] = sys.modules.get("tracer"), tracer(changes)
+    try:
+        yield
+    finally:
+        del sys.modules["tracer"]
+        if before is not None:
+            sys.modules["tracer"] = before
+
+
 def step(number, changes=(), of_tracer=()):
     """Return the functions and constants of a step, with changes to it and to the tracer."""
     (path,) = FOLDER.glob(f"{number:02}_*.py")
     names = {}
     kept = [node for node in ast.parse(replaced(path, dict(changes))).body if defines(node)]
-    before, sys.modules["tracer"] = sys.modules.get("tracer"), tracer(of_tracer)
-    try:
+    with imported_tracer(of_tracer):
         exec(compile(ast.Module(kept, []), str(path), "exec"), names)
-    finally:
-        del sys.modules["tracer"]
-        if before is not None:
-            sys.modules["tracer"] = before
     return SimpleNamespace(**names)
 
 
@@ -298,14 +306,9 @@ def room(*more):
     """Return the scene of step 9."""
     (path,) = FOLDER.glob("09_*.py")
     text, _, _ = path.read_text("utf-8").partition("library = ")
-    before, sys.modules["tracer"] = sys.modules.get("tracer"), tracer()
     names = {}
-    try:
+    with imported_tracer():
         exec(text, names)
-    finally:
-        del sys.modules["tracer"]
-        if before is not None:
-            sys.modules["tracer"] = before
     return wf.Scene([*names["spheres"], *more], camera=names["scene"].camera)
 
 

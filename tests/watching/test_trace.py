@@ -207,6 +207,9 @@ def test_a_firefly_of_a_caustic_is_explained():
 
 def test_what_explain_cannot_tell():
     branched = wf.render(SCENES["sky"], spp=4, size=(8, 8), branches=2, progress=False)
+    clamped = wf.render(SCENES["sky"], spp=4, size=(8, 8), branches=1, reuse=False, clamp=2.0, progress=False)
+    with pytest.raises(wf.SceneError, match=r"clamp=2\.0"):
+        wf.explain(SCENES["sky"], clamped, (4, 4))
     with pytest.raises(wf.SceneError, match="branches=2"):
         wf.explain(SCENES["sky"], branched, (4, 4))
     image = wf.render(SCENES["sky"], size=(8, 8), **RENDER)

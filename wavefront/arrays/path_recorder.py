@@ -23,6 +23,10 @@ class PathRecorder:
 
     needs_directions = False
 
+    def prepare(self, paths: Paths) -> None:
+        """Have paths that start at the camera carry the recorder."""
+        paths.recorder = self
+
     def branched(self, ways: int) -> None:
         """Note that each path goes on in several ways."""
 

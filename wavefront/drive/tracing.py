@@ -11,9 +11,11 @@ import numpy as np
 from ..accel.base import Accelerator, Intersections
 from ..accel.counter import RayCounter
 from ..aovs.recorder import SampleRecorder, recorded_aovs
+from ..arrays.path_recorder import NOBODY, PathRecorder
 from ..arrays.soa import soa
 from ..arrays.state import Words
 from ..arrays.vec import Floats, Ints, broadcast
+from ..camera import Camera
 from ..compile.scene import CompiledScene
 from ..core.errors import SceneError
 from ..core.interrupt import end_with_parent
@@ -24,6 +26,7 @@ from ..integrators import Integrator, integrator_for
 from ..integrators.light_tracing import trace_light
 from ..sampling.filters import Filter
 from ..sampling.sampler import Sampler, SamplerMaker
+from ..sampling.tiles import Tiles
 from ..stages.generate import generate
 from .jobs import Job, JobResult, WaveResult
 
@@ -83,6 +86,34 @@ class Tracer:
         """Return the sampler of a picture of this width, pixels."""
         return self.make_sampler(self.seed, width)
 
+    def radiance(
+        self,
+        scene: CompiledScene,
+        camera: Camera,
+        pixels: Words,
+        samples: Words,
+        recorder: PathRecorder = NOBODY,
+        tiles: Tiles | None = None,
+    ) -> Floats:
+        """Return the radiance (3, n) of samples (n,) of pixels (n,), from the camera to the last surface.
+
+        Parameters
+        ----------
+        scene, camera
+            As the view has them.
+        recorder
+            Looks on.
+        tiles
+            Those whose pixels share paths; None where none do.
+        """
+        sampler = self.sampler(camera.resolution[0])
+        paths = generate(scene, camera, sampler, pixels, samples, self.filter)
+        recorder.prepare(paths)
+        integrator = integrator_for(self.integrator, tiles)
+        radiance = integrator(scene, paths, sampler, self.max_bounces + camera.scatterings)
+        _check_radiance(integrator, radiance, pixels.size)
+        return radiance
+
 
 def trace_job(tracer: Tracer, monitor: WaveMonitor, job: Job) -> JobResult:
     """Trace the waves of a job, one after the other.
@@ -105,21 +136,16 @@ def _trace_wave(tracer: Tracer, monitor: WaveMonitor, job: Job) -> WaveResult:
     accelerator = MonitoredAccelerator(tracer.scene.accelerator, monitor, deadline)
     whole = replace(tracer.scene, accelerator=accelerator)  # as paths from lights meet it
     scene = seen_with(whole, tracer.table if job.view.guided else None, job.view.branches)
-    sampler = tracer.sampler(camera.resolution[0])
-    paths = generate(scene, camera, sampler, np.tile(job.pixels, n), _samples(job), tracer.filter)
+    pixels, samples, tiles = np.tile(job.pixels, n), _samples(job), job.view.tiles
     recorder = SampleRecorder(tracer.layers, scene, k * n, tracer.clamp) if tracer.layers else None
-    if recorder is not None:
-        recorder.prepare(paths)
-    integrator = integrator_for(tracer.integrator, job.view.tiles)
-    radiance = integrator(scene, paths, sampler, tracer.max_bounces + camera.scatterings)
-    _check_radiance(integrator, radiance, k * n)
+    radiance = tracer.radiance(scene, camera, pixels, samples, recorder or NOBODY, tiles)
     finite = np.logical_and.reduce(np.isfinite(radiance))
     if recorder is not None:
-        finite &= recorder.finish(integrator, radiance)
+        finite &= recorder.finish(integrator_for(tracer.integrator, tiles), radiance)
     splats = None
     if scene.specular_surfaces is not None:
         splats = trace_light(
-            whole, camera, sampler, np.tile(job.pixels, n), _samples(job), tracer.max_bounces
+            whole, camera, tracer.sampler(camera.resolution[0]), pixels, samples, tracer.max_bounces
         )
         good = np.isfinite(splats.radiance).all(0)
         finite[splats.path[~good]] = False

@@ -13,8 +13,9 @@ from ..image import Image
 from .path import PathVertices
 from .trace import Pixel, Wave
 
-SETTINGS = ("seed", "sampler", "integrator", "max_bounces", "light_sampler", "filter", "roulette", "clamp")
-CHANGED = {"branches": 1, "reuse": False, "guided": False, "caustics": False}  # paths that are not alone
+SETTINGS = ("seed", "sampler", "integrator", "max_bounces", "light_sampler", "filter", "roulette")
+# paths that are not alone, or light that is cut
+CHANGED = {"branches": 1, "reuse": False, "guided": False, "caustics": False, "clamp": None}
 
 
 @suggests_keywords
@@ -55,12 +56,13 @@ def explain(scene: Any, image: Image, pixel: Pixel, most: int = 3) -> list[PathV
         if image.metadata.get(name, value) != value:
             raise SceneError(
                 f"explain: the picture was rendered with {name}={image.metadata[name]!r}; its paths can "
-                "be told apart where branches=1, reuse=False, guide=False and caustics=False"
+                "be told apart where branches=1, reuse=False, guide=False, caustics=False and clamp=None"
             )
     settings = {name: image.metadata[name] for name in SETTINGS if image.metadata.get(name) is not None}
     wave = Wave(scene, size=(image.rgb.shape[1], image.rgb.shape[0]), **settings)
-    count = int(image.counts[pixel[1], pixel[0]]) if wave.numbers([pixel]).size else 0
-    light = wave.traced(wave.scene, wave.numbers([pixel] * count), np.arange(count, dtype=np.uint32))
+    number = wave.numbers([pixel])
+    count = int(image.counts[pixel[1], pixel[0]])
+    light = wave.traced(wave.scene, number.repeat(count), np.arange(count, dtype=np.uint32))
     mean = light.mean(1, dtype=np.float64)
     if not np.allclose(mean, image.rgb[pixel[1], pixel[0]], rtol=1e-3, atol=1e-6):
         raise SceneError(

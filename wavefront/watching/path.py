@@ -18,6 +18,7 @@ from ..compile.program import Leg
 from ..compile.scene import CompiledScene
 from ..core.html import table_html
 from ..materials import Material
+from ..sampling.mis import power_heuristic
 from ..shapes import Capsules, Shape
 from ..stages.shade import Shading
 from .step import world_points
@@ -262,7 +263,7 @@ class VertexRecorder(PathRecorder):
                 self._scene.lights.pdf_li(emission.light, start, paths.direction, paths.left_receiver)[0]
             )
         bsdf = np.inf if paths.specular[0] else float(paths.pdf[0])
-        weight = bsdf**2 / (bsdf**2 + pdf**2) if leg.mis and pdf else 1.0
+        weight = float(power_heuristic(paths.pdf, np.array([pdf], np.float32))[0]) if leg.mis and pdf else 1.0
         return LightFound(_column(paths.throughput), _column(emission.radiance), weight, pdf, bsdf)
 
     def record_surfaces(self, scene: CompiledScene, paths: Paths, shade: Shading) -> None:

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from ..arrays.path_recorder import PathRecorder
+from ..arrays.path_recorder import NOBODY, PathRecorder
 from ..arrays.state import Contribution, Paths, Words
 from ..arrays.vec import Floats, Ints
 from ..camera import ImageSize
@@ -18,8 +18,6 @@ from ..core.errors import SceneError, in_brief, number
 from ..core.suggestions import suggests_keywords
 from ..drive import Session
 from ..features.view import seen_with
-from ..integrators.registry import integrator_for
-from ..stages.generate import generate
 from ..stages.shade import Shading
 from .in_turns import in_turns
 from .path import PathVertices, VertexRecorder
@@ -148,10 +146,10 @@ class Wave:
 
     def show(self, numbers: Ints, sample: int, give: Give) -> None:
         """Trace a sample of pixels, and give a step after each stage."""
-        onlooker = Onlooker(give, numbers.size)
+        onlooker = Onlooker(self.scene, give, numbers.size)
         scene = replace(self.scene, program=watched(self.scene.program, onlooker))
         light = self.traced(scene, numbers, np.full(numbers.size, sample, np.uint32), onlooker)
-        onlooker.end(scene, light)
+        onlooker.end(light)
 
     def path(self, pixel: Pixel, sample: int) -> PathVertices:
         """Return the vertices of one path."""
@@ -166,30 +164,24 @@ class Wave:
         return seen_with(self.tracer.scene)
 
     def traced(
-        self, scene: CompiledScene, numbers: Ints, samples: Words, recorder: PathRecorder | None = None
+        self, scene: CompiledScene, numbers: Ints, samples: Words, recorder: PathRecorder = NOBODY
     ) -> Floats:
         """Return the light (3, n) of samples (n,) of pixels (n,), with a recorder that looks on."""
-        tracer, camera = self.tracer, self.camera
-        sampler = tracer.sampler(camera.resolution[0])
-        paths = generate(scene, camera, sampler, numbers.astype(np.uint32), samples, tracer.filter)
-        if recorder is not None:
-            paths.recorder = recorder
-        if isinstance(recorder, Onlooker):
-            recorder.begin(scene, paths)
-        integrator = integrator_for(tracer.integrator, None)
-        return integrator(scene, paths, sampler, tracer.max_bounces + camera.scatterings)
+        return self.tracer.radiance(scene, self.camera, numbers.astype(np.uint32), samples, recorder)
 
 
 class Onlooker(PathRecorder):
     """Gives a step after each stage that the paths which carry it go through."""
 
-    def __init__(self, give: Give, slots: int) -> None:
-        self._give, self._bounce, self._light = give, 0, np.zeros((3, slots), np.float32)
+    def __init__(self, scene: CompiledScene, give: Give, slots: int) -> None:
+        self._scene, self._give, self._bounce = scene, give, 0
+        self._light = np.zeros((3, slots), np.float32)
 
-    def begin(self, scene: CompiledScene, paths: Paths) -> None:
+    def prepare(self, paths: Paths) -> None:
         """Show paths that start at the camera."""
+        super().prepare(paths)
         self._paths = paths
-        self._give(Step("generate", 0, scene, self._light, paths))
+        self._give(Step("generate", 0, self._scene, self._light, paths))
 
     def stage(self, name: str, leg: Leg) -> None:
         """Show a leg after something has acted on it."""
@@ -204,7 +196,7 @@ class Onlooker(PathRecorder):
 
     def record_surfaces(self, scene: CompiledScene, paths: Paths, shade: Shading) -> None:
         """Show surfaces that are ready to be shaded."""
-        self._scene, self._surface = scene, shade.surface
+        self._surface = shade.surface
         self._give(Step("shade", self._bounce, scene, self._light, paths, None, shade.surface))
 
     def record_light(
@@ -221,9 +213,9 @@ class Onlooker(PathRecorder):
         step = Step("bounce-sample", self._bounce, self._scene, self._light, left, None, shade.surface)
         self._give(step)
 
-    def end(self, scene: CompiledScene, light: Floats) -> None:
+    def end(self, light: Floats) -> None:
         """Show the picture."""
-        self._give(Step("end", self._bounce, scene, light, self._paths))
+        self._give(Step("end", self._bounce, self._scene, light, self._paths))
 
 
 def watched(program: Program, onlooker: Onlooker) -> Program:
