@@ -2,6 +2,7 @@
 
 import pickle
 from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -20,12 +21,9 @@ class CameraFog(wf.Feature):
 
     def fly(self, leg):
         """Weaken camera rays by their length, and add the color of what is in front."""
-        paths = leg.paths
-        start = paths.origin if paths.prev_vertex is None else paths.prev_vertex  # surfaces passed are behind
-        length = leg.hits.t + np.linalg.norm(paths.origin - start, axis=0)
-        through = np.exp(-self.density * length)  # 0 where nothing is met
-        leg.L[:, paths.slot] += self.color * paths.throughput * (1 - through)
-        paths.throughput *= through
+        through = np.exp(-self.density * leg.length)  # 0 where nothing is met
+        leg.L[:, leg.paths.slot] += self.color * leg.paths.throughput * (1 - through)
+        leg.paths.throughput *= through
 
 
 SUN = wf.DirectionalLight((0, 0, -1), 3)
@@ -43,6 +41,18 @@ def test_only_the_camera_sees_it(shapes) -> None:
     foggy = wf.render(scene, features=FOG, **OPTIONS).rgb
     assert foggy == pytest.approx(clear * np.exp(-1) + np.array([0, 0, 1 - np.exp(-1)]), rel=1e-4)
     assert np.array_equal(wf.render(scene, features=[], **OPTIONS).rgb, clear)
+
+
+def test_the_page_for_contributors_has_this_fog() -> None:
+    page = (Path(__file__).parents[2] / "docs" / "architecture.md").read_text("utf-8")
+    code = page.partition("### Feature\n")[2].partition("```python\n")[2].partition("\n\n\nfog =")[0]
+    own: dict[str, type[wf.Feature]] = {}
+    exec(code, own)
+    scene = wf.Scene([WALL, PANE], [SUN], CAMERA)
+    pages, here = (
+        wf.render(scene, features=each, **OPTIONS).rgb for each in (own["CameraFog"](0.25, (0, 0, 1)), FOG)
+    )
+    assert np.array_equal(pages, here)
 
 
 def test_a_mirror_shows_no_fog() -> None:

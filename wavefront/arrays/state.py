@@ -180,6 +180,11 @@ class Paths(Rays):
     met_rough: Bools | None = None  # (n,) the path has met a surface that is not specular
     recorder: PathRecorder = NOBODY  # of the wave
 
+    @property
+    def last_vertex(self) -> Floats:
+        """Where the paths started or last scattered, (3, n), before the surfaces that they have passed."""
+        return self.origin if self.prev_vertex is None else self.prev_vertex
+
 
 @soa
 class Hits(SoA):

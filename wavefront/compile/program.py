@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any, ClassVar, Self, TypeVar
 
 from ..arrays.soa import soa
 from ..arrays.state import Contribution, Hits, Paths, Rays, SurfaceInteraction
-from ..arrays.vec import Bools, Floats, Ints, Lanes
+from ..arrays.vec import Bools, Floats, Ints, Lanes, length
 from ..core.errors import SceneError, in_brief
 from ..materials import Material
 from ..sampling.sampler import Dimension, Sampler, numbers_of
@@ -56,6 +56,12 @@ class Leg:
     lanes: Ints = field(init=False)  # (k,) of the paths that go on
     kept_paths: Paths = field(init=False)  # those, as they will be shaded
     kept_hits: Hits = field(init=False)
+
+    @property
+    def length(self) -> Floats:
+        """How far the hits are from where the paths started or last scattered, (n,); inf on a miss."""
+        behind = length(self.paths.origin - self.paths.last_vertex)  # 0 where they have passed nothing
+        return self.hits.t + behind
 
 
 @soa

@@ -71,10 +71,7 @@ def _glow_weights(scene: CompiledScene, paths: Paths, lanes: Ints, medium: Ints)
     if not sampled.size:
         return None
     at = lanes.take(sampled)
-    origin, start = (
-        take(paths.origin, lanes),
-        paths.origin if paths.prev_vertex is None else paths.prev_vertex,
-    )
+    origin, start = take(paths.origin, lanes), paths.last_vertex
     receiver = None if paths.left_receiver is None else paths.left_receiver.take(at)
     chance = scene.lights.pmf(light.take(sampled), take(start, at), receiver)
     ratio = np.zeros(lanes.size, f4)

@@ -199,7 +199,7 @@ def mis_weighted(scene: CompiledScene, paths: Paths, emission: Contribution) -> 
     if not sampled.size:
         return emission
     lanes = emission.lanes.take(sampled)
-    start = take(paths.origin if paths.prev_vertex is None else paths.prev_vertex, lanes)
+    start = take(paths.last_vertex, lanes)
     receiver = None if paths.left_receiver is None else paths.left_receiver.take(lanes)
     light = emission.light.take(sampled)
     pdf = scene.lights.pdf_li(light, start, take(paths.direction, lanes), receiver)

@@ -255,7 +255,7 @@ class VertexRecorder(PathRecorder):
         emission, paths = leg.emission, leg.paths
         if not len(emission.lanes):
             return None
-        start = paths.origin if paths.prev_vertex is None else paths.prev_vertex
+        start = paths.last_vertex
         known = self._scene.lights.chosen_from.take(emission.light)[0] and not paths.specular[0]
         pdf = 0.0
         if known:
