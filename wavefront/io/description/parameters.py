@@ -21,7 +21,13 @@ class Parameter(NamedTuple):
     neutral: Any = None  # the value that changes nothing
     low: float = 0.0
     high: float = 1.0
+    times: float = 1.0  # by which theirs is multiplied
     beside: str = ""  # another parameter, by our name, without which this one has no effect
+
+    @property
+    def is_color(self) -> bool:
+        """Whether it is a color, not a number."""
+        return bool(np.ndim(self.default))
 
 
 # of glTF, and of what trimesh makes of glTF and COLLADA

@@ -197,7 +197,7 @@ class _Reader:
 
     def _factor(self, group: dict[str, Any], row: Parameter) -> Any:
         """Return a number or a color (3,)."""
-        if np.ndim(row.default):
+        if row.is_color:
             return self._color(group, row.theirs, list(row.default), row.high)
         return self._number(group, row.theirs, row.default, row.high)
 

@@ -26,9 +26,26 @@ from .gprims import along
 from .materials import Materials
 from .values import check_even, mean_scale, value_of
 
-PLAIN: dict[str, Any] = {"inputs:diffuse": 1.0, "inputs:specular": 1.0, "inputs:shaping:focus": 0.0}
-PLAIN |= {"inputs:shaping:ies:file": None}  # by their values where they change nothing
-
+# inputs of lights that are read, and their defaults
+INPUTS: dict[str, Any] = {
+    "color": (1.0, 1.0, 1.0),
+    "intensity": 1.0,
+    "exposure": 0.0,
+    "normalize": False,
+    "enableColorTemperature": False,
+    "colorTemperature": 6500.0,
+    "radius": 0.5,
+    "width": 1.0,
+    "height": 1.0,
+    "length": 1.0,
+    "angle": 0.53,
+    "texture:file": None,
+    "texture:format": "automatic",
+    "shaping:cone:angle": 90.0,
+    "shaping:cone:softness": 0.0,
+}
+# inputs that are not read, by the values with which they change nothing
+UNREAD = {"diffuse": 1.0, "specular": 1.0, "shaping:focus": 0.0, "shaping:ies:file": None}
 KELVIN = 1e3, 1e6  # color temperatures; lower ones are clamped by usd-core, too
 LEAST = 1e-3  # meters, in place of a size of 0
 TINTED = "materialGlowTintsLight"  # what the emission of a material does to the light of its mesh
@@ -60,7 +77,7 @@ class Lamp:
         self.plain_inputs()
         make, *sizes = LAMPS[str(self.prim.GetTypeName())]
         for name in sizes:
-            if self.of(name, 1.0) == 0 and not self.of("normalize", False):
+            if self.of(name) == 0 and not self.of("normalize"):
                 self.lose(f"inputs:{name} is 0 and gives no light", "left out")
                 return None
         made: Light | Shape | None = make(self)
@@ -68,44 +85,44 @@ class Lamp:
 
     def plain_inputs(self) -> None:
         """Note inputs that are not honored."""
-        for name, usual in PLAIN.items():
-            if value_of(self.prim, self.materials.time, name, usual) != usual:
-                self.lose(name)
+        for name, usual in UNREAD.items():
+            if value_of(self.prim, self.materials.time, f"inputs:{name}", usual) != usual:
+                self.lose(f"inputs:{name}")
 
     def lose(self, what: str, done: str = NOT_HONORED) -> None:
         """Note what is not honored."""
         self.materials.lose(self.prim, what, done)
 
-    def of(self, name: str, default: Any) -> Any:
-        """Return an input."""
-        return value_of(self.prim, self.materials.time, f"inputs:{name}", default)
+    def of(self, name: str) -> Any:
+        """Return an input of the table."""
+        return value_of(self.prim, self.materials.time, f"inputs:{name}", INPUTS[name])
 
     def flag(self, name: str) -> bool:
         """Return an attribute that is no input."""
         return bool(value_of(self.prim, self.materials.time, name, False))
 
-    def length(self, name: str, default: float, axis: int | None = None) -> float:
+    def length(self, name: str, axis: int | None = None) -> float:
         """Return a length along an axis of the light, or in all directions, in the scene's units."""
         scale = mean_scale(self.matrix) if axis is None else self.scale[axis]
-        return float(self.of(name, default)) * float(scale)
+        return float(self.of(name)) * float(scale)
 
-    def size(self, name: str, default: float, axis: int | None = None) -> float:
+    def size(self, name: str, axis: int | None = None) -> float:
         """Return such a length; a small one in place of 0, through which the power of `normalize` passes."""
-        length = self.length(name, default, axis)
+        length = self.length(name, axis)
         if length == 0:
             self.lose(f"inputs:{name} is 0", f"{LEAST:g} meters in its place")
         return length or LEAST
 
     def strength(self, area: float = 1.0) -> Doubles:
         """Return the radiance (3,), which `normalize` divides by the area, in the scene's units."""
-        return self.color() / (area / self.unit**2 if self.of("normalize", False) else 1.0)
+        return self.color() / (area / self.unit**2 if self.of("normalize") else 1.0)
 
     def color(self) -> Doubles:
         """Return the radiance (3,) without `normalize`."""
-        color = np.asarray(self.of("color", (1, 1, 1)), float) * float(self.of("intensity", 1.0))
-        color = color * 2.0 ** float(self.of("exposure", 0.0))
-        if self.of("enableColorTemperature", False):
-            warm, place = float(self.of("colorTemperature", 6500.0)), str(self.prim.GetPath())
+        color = np.asarray(self.of("color"), float) * float(self.of("intensity"))
+        color = color * 2.0 ** float(self.of("exposure"))
+        if self.of("enableColorTemperature"):
+            warm, place = float(self.of("colorTemperature")), str(self.prim.GetPath())
             kelvin = self.materials.files.losses.within("inputs:colorTemperature", warm, *KELVIN, place)
             white = blackbody(float(kelvin))
             color = color * (white / luminance(white))
@@ -114,26 +131,26 @@ class Lamp:
     @property
     def cone(self) -> float:
         """The angle from the axis in which it shines, degrees."""
-        return float(self.of("shaping:cone:angle", 90.0))
+        return float(self.of("shaping:cone:angle"))
 
     def plain(self, cone: bool = True, image: bool = True) -> None:
         """Note a cone or an image that is not honored."""
         if cone and self.cone < 90:
             self.lose("inputs:shaping:cone:angle")
-        if image and self.of("texture:file", None) is not None:
+        if image and self.of("texture:file") is not None:
             self.lose("inputs:texture:file")
 
 
 def _distant(lamp: Lamp) -> Light:
-    angle = float(lamp.of("angle", 0.53))
+    angle = float(lamp.of("angle"))
     spread = math.pi * math.sin(math.radians(angle) / 2) ** 2
-    factor = 1.0 if lamp.of("normalize", False) or not spread else spread
+    factor = 1.0 if lamp.of("normalize") or not spread else spread
     return DirectionalLight(-lamp.axes[:, 2], lamp.strength(lamp.unit**2) * factor, angle=angle)
 
 
 def _dome(lamp: Lamp) -> Light:
-    file, bright = lamp.of("texture:file", None), lamp.strength(lamp.unit**2)
-    if lamp.of("texture:format", "automatic") not in ("automatic", "latlong"):
+    file, bright = lamp.of("texture:file"), lamp.strength(lamp.unit**2)
+    if lamp.of("texture:format") not in ("automatic", "latlong"):
         lamp.lose("inputs:texture:format; 'latlong' in its place")
     if file is None:
         return Environment(bright)
@@ -144,7 +161,7 @@ def _dome(lamp: Lamp) -> Light:
 def _ball(lamp: Lamp) -> Light | Shape:
     check_even(lamp.matrix, lamp.lose)
     lamp.plain(cone=False)
-    radius = lamp.length("radius", 0.5)
+    radius = lamp.length("radius")
     point = radius == 0 or lamp.flag("treatAsPoint")
     if not point and lamp.cone >= 90:
         glow = lamp.strength(4 * math.pi * radius**2)
@@ -152,10 +169,10 @@ def _ball(lamp: Lamp) -> Light | Shape:
     if not point:
         lamp.lose("its radius; a SpotLight in its place")
     # the radiance times π radius²; `normalize` divides it by the area, of which that is a fourth
-    intensity = lamp.color() * (lamp.unit**2 / 4 if lamp.of("normalize", False) else math.pi * radius**2)
+    intensity = lamp.color() * (lamp.unit**2 / 4 if lamp.of("normalize") else math.pi * radius**2)
     if lamp.cone >= 90:
         return PointLight(lamp.center, intensity)
-    softness = min(max(float(lamp.of("shaping:cone:softness", 0.0)), 0.0), 1.0)
+    softness = min(max(float(lamp.of("shaping:cone:softness")), 0.0), 1.0)
     axis = -lamp.axes[:, 2]
     return SpotLight(lamp.center, intensity, direction=axis, angle=2 * lamp.cone, blend=softness)
 
@@ -163,16 +180,16 @@ def _ball(lamp: Lamp) -> Light | Shape:
 def _disk(lamp: Lamp) -> Shape:
     check_even(lamp.matrix, lamp.lose)
     lamp.plain()
-    radius = lamp.size("radius", 0.5)
+    radius = lamp.size("radius")
     glow = lamp.strength(math.pi * radius**2)
     return Disk(lamp.center, -lamp.axes[:, 2], radius, emission=glow, name=lamp.name)
 
 
 def _rectangle(lamp: Lamp) -> Shape:
     lamp.plain(image=False)
-    width, height = lamp.size("width", 1.0, 0), lamp.size("height", 1.0, 1)
+    width, height = lamp.size("width", 0), lamp.size("height", 1)
     glow: Any = lamp.strength(width * height)
-    file = lamp.of("texture:file", None)
+    file = lamp.of("texture:file")
     image = None if file is None else lamp.materials.pixels(lamp.prim, file)
     if image is not None:
         glow = Texture(image, wrap="clamp", scale=glow)
@@ -186,8 +203,8 @@ def _cylinder(lamp: Lamp) -> Shape | None:
     if lamp.flag("treatAsLine"):
         lamp.lose("treatAsLine")
     along_x, across = float(lamp.scale[0]), math.sqrt(lamp.scale[1] * lamp.scale[2])
-    half = lamp.size("length", 1.0, 0) / along_x / 2
-    radius = float(lamp.of("radius", 0.5)) or lamp.size("radius", 0.0) / across
+    half = lamp.size("length", 0) / along_x / 2
+    radius = float(lamp.of("radius")) or lamp.size("radius") / across
     side = along("X", revolved(lamp.name, [slope((radius, radius), (-half, half))]))
     side.emission = lamp.strength(4 * math.pi * radius * across * half * along_x)
     return build("", moved_raw(side, lamp.matrix), lamp.materials.files.losses)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -20,21 +20,33 @@ from ...textures.base import BaseTexture
 from ...textures.image import StoredImage
 from ..description.appearance import F0
 from ..description.computed import texture_within
+from ..description.parameters import Parameter
 from ..repair import RawMesh
 from ..sources import MISSING, SceneFiles
 from .layers import typed
 from .tints import Tint
 
 WRAPS = {"repeat": "repeat", "clamp": "clamp", "mirror": "mirror", "useMetadata": "repeat"}
-NUMBERS = {  # theirs, ours and the default
-    "metallic": ("metallic", 0.0),
-    "roughness": ("roughness", 0.5),
-    "ior": ("ior", 1.5),
-    "clearcoat": ("clearcoat", 0.0),
-    "clearcoatRoughness": ("clearcoat_roughness", 0.01),
-}
-GRAY, BLACK = (0.18, 0.18, 0.18), (0.0, 0.0, 0.0)  # defaults
 LEAST_IOR = 1e-6
+GRAY, BLACK, UP = (0.18, 0.18, 0.18), (0.0, 0.0, 0.0), (0.0, 0.0, 1.0)
+# inputs of UsdPreviewSurface, in the order in which they are read
+DISPLACEMENT = Parameter("", "displacement")
+NUMBERS = (
+    Parameter("metallic", "metallic"),
+    Parameter("roughness", "roughness", 0.5),
+    Parameter("ior", "ior", 1.5, low=LEAST_IOR, high=1 / LEAST_IOR),
+    Parameter("clearcoat", "clearcoat"),
+    Parameter("clearcoat_roughness", "clearcoatRoughness", 0.01),
+)
+WORKFLOW = Parameter("", "useSpecularWorkflow")
+SPECULAR = (Parameter("specular_color", "specularColor", BLACK, times=1 / F0, high=1 / F0),)
+BASE = (
+    Parameter("base_color", "diffuseColor", GRAY),
+    Parameter("alpha", "opacity", 1.0),
+    Parameter("alpha_cutoff", "opacityThreshold"),
+)
+NORMAL = Parameter("normal_map", "normal", UP)
+GLOW = (Parameter("emission", "emissiveColor", BLACK, high=FLOAT32_MAX),)
 CHANNELS = {"r": 0, "g": 1, "b": 2, "a": 3}
 COLORED = Material(Diffuse(VertexColors()))
 VEILED = Material(Diffuse(VertexColors()), alpha=VertexColors(channel=3))
@@ -171,127 +183,121 @@ class _Surface:
 
     def look(self, name: str) -> Look:
         """Return the material, which gets a name."""
-        if self._value("displacement", 0.0) != 0:
+        if self._value(DISPLACEMENT) != 0:
             self.lose(self.shader.GetPrim(), "displacement")
-        numbers = {
-            ours: self._within(theirs, self._value(theirs, default), default)
-            for theirs, (ours, default) in NUMBERS.items()
-        }
-        if self._value("useSpecularWorkflow", 0.0) == 1:
-            tint = self._value("specularColor", BLACK, color=True, times=1 / F0)
-            tint = self._within("specularColor", tint, BLACK, 1 / F0)
-            numbers |= {"metallic": 0.0, "ior": 1.5, "specular_color": tint}
-        base = self._value("diffuseColor", GRAY, color=True)
-        base = self._within("diffuseColor", base, GRAY)
-        opacity, cut = (
-            self._within(theirs, self._value(theirs, default), default)
-            for theirs, default in (("opacity", 1.0), ("opacityThreshold", 0.0))
-        )
-        normal = self._value("normal", None, color=True, normal=True)
-        glow = self._value("emissiveColor", BLACK, color=True)
-        glow = self._within("emissiveColor", glow, BLACK, FLOAT32_MAX)
+        wanted = self._inputs(NUMBERS)
+        if self._value(WORKFLOW) == 1:
+            wanted |= {"metallic": 0.0, "ior": 1.5} | self._inputs(SPECULAR)
+        wanted |= self._inputs(BASE)
+        alpha, cutoff = wanted.pop("alpha"), wanted.pop("alpha_cutoff")
+        normal, glow = self._value(NORMAL), self._inputs(GLOW)["emission"]
         material = Material(
-            Principled(base, **numbers),
-            alpha=None if isinstance(opacity, float) and opacity >= 1 else opacity,
-            alpha_cutoff=float(cut) if isinstance(cut, float) and cut > 0 else None,
+            Principled(**wanted),
+            alpha=None if isinstance(alpha, float) and alpha >= 1 else alpha,
+            alpha_cutoff=cutoff if isinstance(cutoff, float) and cutoff > 0 else None,
             normal_map=NormalMap(normal) if isinstance(normal, Texture) else None,
             name=name,
         )
         emission = glow if isinstance(glow, BaseTexture) or any(glow) else None
         return Look(material, emission, self.primvars, self.fallbacks)
 
-    def _within(self, name: str, value: Any, default: Any, high: float = 1.0) -> Any:
+    def _inputs(self, rows: Iterable[Parameter]) -> dict[str, Any]:
+        """Return the inputs of a table, each in its range, by our names."""
+        return {row.ours: self._within(row, self._value(row)) for row in rows}
+
+    def _within(self, row: Parameter, value: Any) -> Any:
         """Return the value of an input, clamped to its range where it is outside, which is noted."""
-        place = str(self.shader.GetPrim().GetPath())
-        if isinstance(value, BaseTexture) and name != "ior":
-            return texture_within(self.materials.files.losses, f"inputs:{name}", value, high, place)
+        place, losses = str(self.shader.GetPrim().GetPath()), self.materials.files.losses
+        name = f"inputs:{row.theirs}"
+        if isinstance(value, BaseTexture):  # those of an index are checked where they are used
+            return value if row.low else texture_within(losses, name, value, row.high, place)
         if not isinstance(value, float | tuple):
             return value
-        low, high = (LEAST_IOR, 1 / LEAST_IOR) if name == "ior" else (0.0, high)
         if not np.isfinite(value).all():
-            self.materials.files.losses.note(f"inputs:{name}", place, str(value), "its default in its place")
-            return default
-        limited = self.materials.files.losses.within(f"inputs:{name}", value, low, high, place)
+            losses.note(name, place, str(value), "its default in its place")
+            return row.default
+        limited = losses.within(name, value, row.low, row.high, place)
         return tuple(limited.tolist()) if isinstance(value, tuple) else float(limited)
 
-    def _value(
-        self, name: str, default: Any, color: bool = False, normal: bool = False, times: float = 1.0
-    ) -> Any:
-        """Return an input, times a factor: a float, a color as a tuple, or a texture.
+    def _value(self, row: Parameter) -> Any:
+        """Return an input, times its factor: a float, a color as a tuple, or a texture.
 
         It is the default where it is damaged.
         """
         place = str(self.shader.GetPrim().GetPath())
         losses = self.materials.files.losses
-        with losses.part(place, f"the default of {name} in its place"), typed("is damaged"):
-            return self._read(name, default, color, normal, times)
-        return default
+        with losses.part(place, f"the default of {row.theirs} in its place"), typed("is damaged"):
+            return self._read(row)
+        return row.default
 
-    def _read(self, name: str, default: Any, color: bool, normal: bool, times: float) -> Any:
-        sources = _sources(self.shader, name)
+    def _read(self, row: Parameter) -> Any:
+        sources = _sources(self.shader, row.theirs)
         if not sources:
-            return default
+            return row.default
         from pxr import UsdShade
 
         source = UsdShade.Shader(sources[0].GetPrim())
         if UsdShade.Output.IsOutput(sources[0]) and source:
-            return self._texture(source, sources[0].GetBaseName(), default, color, normal, times)
+            return self._connected(row, source, sources[0].GetBaseName())
         value = sources[0].Get(self.time)
         if value is None:
-            return default
-        return tuple(float(part) * times for part in value) if color else float(value) * times
+            return row.default
+        return _scaled(row, value) if row.is_color else float(value) * row.times
 
-    def _texture(
-        self, source: Any, output: str, default: Any, color: bool, normal: bool, times: float
-    ) -> Any:
+    def _connected(self, row: Parameter, source: Any, output: str) -> Any:
+        """Return what an output of another shader gives to an input."""
         kind = _kind(source)
         given = self.tint.get(str(self._get(source, "varname", ""))) if "PrimvarReader" in kind else None
-        if given is not None and not normal:
-            row = tuple(float(part) * times for part in given)
-            return row if color and len(row) == 3 else row[0] if not color else default
-        if kind.startswith("UsdPrimvarReader_float3") and color and not normal and times == 1:
-            return default if self._primvar(source, COLORS) is None else VertexColors()
-        if kind == "UsdPrimvarReader_float" and not color:
-            return default if self._primvar(source, (OPACITY,)) is None else VertexColors(channel=3)
+        if given is not None and row is not NORMAL:
+            values = _scaled(row, given)
+            return values if row.is_color and len(values) == 3 else row.default if row.is_color else values[0]
+        plain = row.is_color and row is not NORMAL and row.times == 1
+        if kind.startswith("UsdPrimvarReader_float3") and plain:
+            return row.default if self._primvar(source, COLORS) is None else VertexColors()
+        if kind == "UsdPrimvarReader_float" and not row.is_color:
+            return row.default if self._primvar(source, (OPACITY,)) is None else VertexColors(channel=3)
         path = self._get(source, "file")
-        if kind != "UsdUVTexture" or path is None:
-            if kind != "UsdUVTexture" or self._get(source, "fallback") is None:
-                what = f"the shader {kind!r}" if kind != "UsdUVTexture" else "file"
-                self.lose(source.GetPrim(), what)
-            return self._fallback(source, output, default, color, normal, times)
-        pixels = self.materials.pixels(source.GetPrim(), path)
+        if kind != "UsdUVTexture":
+            self.lose(source.GetPrim(), f"the shader {kind!r}")
+        elif path is None and self._get(source, "fallback") is None:
+            self.lose(source.GetPrim(), "file")
+        readable = kind == "UsdUVTexture" and path is not None
+        pixels = self.materials.pixels(source.GetPrim(), path) if readable else None
         if pixels is None:
-            return self._fallback(source, output, default, color, normal, times)
+            return self._fallback(row, source, output)
+        return self._texture(row, source, output, pixels)
+
+    def _texture(self, row: Parameter, source: Any, output: str, pixels: StoredImage) -> Texture:
+        """Return the texture of a UsdUVTexture."""
         scale, bias = self._get(source, "scale", (1, 1, 1, 1)), self._get(source, "bias", (0, 0, 0, 0))
         space = self._get(source, "sourceColorSpace", "auto")
         wraps = [str(self._get(source, name, "useMetadata")) for name in ("wrapS", "wrapT")]
         for wrap in set(wraps) - WRAPS.keys():
             self.lose(source.GetPrim(), f"wrap {wrap!r}; 'clamp' in its place")
-        channel = None if color else CHANNELS.get(output, 0)
-        part = slice(0, 3) if color else channel
+        channel = None if row.is_color else CHANNELS.get(output, 0)
+        part = slice(0, 3) if row.is_color else channel
         transform, field = self._coordinates(source)
+        data = row is NORMAL
         return Texture(
             pixels,
-            srgb=not normal and (space == "sRGB" or (space == "auto" and color)),
+            srgb=not data and (space == "sRGB" or (space == "auto" and row.is_color)),
             wrap=tuple(WRAPS.get(wrap, "clamp") for wrap in wraps),  # type: ignore[arg-type]
             transform=transform,
             channel=channel,
-            scale=1.0 if normal else np.asarray(scale, float)[part] * times,
-            offset=0.0 if normal else np.asarray(bias, float)[part] * times,
+            scale=1.0 if data else np.asarray(scale, float)[part] * row.times,
+            offset=0.0 if data else np.asarray(bias, float)[part] * row.times,
             uv_set=COORDINATES.index(field),  # type: ignore[arg-type]
         )
 
-    def _fallback(
-        self, source: Any, output: str, default: Any, color: bool, normal: bool, times: float
-    ) -> Any:
+    def _fallback(self, row: Parameter, source: Any, output: str) -> Any:
         """Return what a texture has in place of an image that cannot be read."""
         value = self._get(source, "fallback")
-        if value is None or normal:
-            return default
-        row = np.ravel(value)
-        if color:
-            return tuple(float(part) * times for part in np.resize(row, 3))
-        return float(row[min(CHANNELS.get(output, 0), len(row) - 1)]) * times
+        if value is None or row is NORMAL:
+            return row.default
+        values = np.ravel(value)
+        if row.is_color:
+            return _scaled(row, np.resize(values, 3))
+        return float(values[min(CHANNELS.get(output, 0), len(values) - 1)]) * row.times
 
     def _get(self, source: Any, name: str, default: Any = None) -> Any:
         sources = _sources(source, name)
@@ -337,6 +343,10 @@ class _Surface:
 
     def _field(self, name: str, fields: tuple[str, ...]) -> str | None:
         return next((each for each in fields if self.primvars.setdefault(each, name) == name), None)
+
+
+def _scaled(row: Parameter, values: Any) -> tuple[float, ...]:
+    return tuple(float(each) * row.times for each in values)
 
 
 def _kind(shader: Any) -> str:
