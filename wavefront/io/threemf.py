@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import zipfile
 from array import array
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from io import BytesIO
 
@@ -32,8 +33,7 @@ from .xml_checks import check_expanded, look_through
 MAX_MEMBERS = 2**12
 XML_BYTES = 4  # of memory for each byte of a member
 ROOT = "3d/3dmodel.model"  # the first member whose name contains this, in any case, is read
-LOST = ("texture2dgroup", "compositematerials", "multiproperties", "beamlattice")
-GROUPS = {"basematerials": ("base", "displaycolor"), "colorgroup": ("color", "color")}
+CODES = {"base": "displaycolor", "color": "color"}  # elements of groups, and their attributes with a color
 UNITS = {"micron": 1e-6, "millimeter": 1e-3, "centimeter": 1e-2, "inch": 0.0254, "foot": 0.3048, "meter": 1.0}
 NO_COLOR = (0.5, 0.5, 0.5)  # of triangles without one beside others that have one; linear
 
@@ -218,33 +218,31 @@ class _Model:
 
     def read(self, content: bytearray) -> None:
         """Add the objects, colors and items of the member to the package."""
-        begins = {
-            "object": self._begin_object,
-            "vertex": self._vertex,
-            "triangle": self._triangle,
-            "component": self._component,
-            "item": self._item,
-        }
 
         def begin(tag: str, attributes: dict[str, str], at: int) -> None:
-            if tag in begins:
-                begins[tag](attributes)
-            elif tag == "model" and self._root:
-                self._unit(attributes.get("unit", "millimeter"))
-            elif tag in GROUPS:
-                self._group = self._package._groups.setdefault(self._key(attributes.get("id", "")), [])
-            elif self._group is not None and tag in ("base", "color"):
-                self._group.append(attributes.get(dict(GROUPS.values())[tag], ""))
-            elif tag in LOST:
-                self._package.lost[tag] = None
-                self._group = None
+            if tag in ELEMENTS:
+                ELEMENTS[tag](self, tag, attributes)
 
         look_through(f"{self._package.losses.name}: {self._member}", content, begin)
 
-    def _unit(self, unit: str) -> None:
+    def _unit(self, tag: str, attributes: dict[str, str]) -> None:
+        if not self._root:
+            return
+        unit = attributes.get("unit", "millimeter")
         if unit not in UNITS:
             self._note("unit", repr(unit[:40]), "millimeter in its place")
         self._package.unit = UNITS.get(unit, UNITS["millimeter"])
+
+    def _begin_group(self, tag: str, attributes: dict[str, str]) -> None:
+        self._group = self._package._groups.setdefault(self._key(attributes.get("id", "")), [])
+
+    def _code(self, tag: str, attributes: dict[str, str]) -> None:
+        if self._group is not None:
+            self._group.append(attributes.get(CODES[tag], ""))
+
+    def _lost(self, tag: str, attributes: dict[str, str]) -> None:
+        self._package.lost[tag] = None
+        self._group = None
 
     def _note(self, part: str, value: str, done: str) -> None:
         self._package.losses.note(part, self._member, value, done)
@@ -252,17 +250,17 @@ class _Model:
     def _key(self, identity: str) -> str:
         return f"{self._member}#{identity}"
 
-    def _begin_object(self, attributes: dict[str, str]) -> None:
+    def _begin_object(self, tag: str, attributes: dict[str, str]) -> None:
         pid = attributes.get("pid")
         color = None if pid is None else (pid, self._whole(attributes, "pindex", 0))
         self._object = _Object(attributes.get("name", ""), color)
         self._package._objects[self._key(attributes.get("id", ""))] = self._object
 
-    def _vertex(self, attributes: dict[str, str]) -> None:
+    def _vertex(self, tag: str, attributes: dict[str, str]) -> None:
         if self._object is not None:
             self._object.vertices.extend(self._number(attributes, axis) for axis in "xyz")
 
-    def _triangle(self, attributes: dict[str, str]) -> None:
+    def _triangle(self, tag: str, attributes: dict[str, str]) -> None:
         each = self._object
         if each is None:
             return
@@ -274,12 +272,12 @@ class _Model:
             each.paint.extend((len(each.corners) // 3, group, *numbers))
         each.corners.extend(self._whole(attributes, name) for name in ("v1", "v2", "v3"))
 
-    def _component(self, attributes: dict[str, str]) -> None:
+    def _component(self, tag: str, attributes: dict[str, str]) -> None:
         if self._object is not None:
             child = self._package.key(self._member, attributes)
             self._object.components.append((child, self._matrix(attributes)))
 
-    def _item(self, attributes: dict[str, str]) -> None:
+    def _item(self, tag: str, attributes: dict[str, str]) -> None:
         if self._root:
             self._package._items.append(
                 (self._package.key(self._member, attributes), self._matrix(attributes))
@@ -319,3 +317,23 @@ class _Model:
         matrix = IDENTITY.copy()
         matrix[:3] = rows.T
         return matrix
+
+
+# what is read of each element when it begins
+ELEMENTS: dict[str, Callable[[_Model, str, dict[str, str]], None]] = {
+    "model": _Model._unit,
+    "basematerials": _Model._begin_group,
+    "colorgroup": _Model._begin_group,
+    "base": _Model._code,
+    "color": _Model._code,
+    "object": _Model._begin_object,
+    "vertex": _Model._vertex,
+    "triangle": _Model._triangle,
+    "component": _Model._component,
+    "item": _Model._item,
+    # these are noted
+    "texture2dgroup": _Model._lost,
+    "compositematerials": _Model._lost,
+    "multiproperties": _Model._lost,
+    "beamlattice": _Model._lost,
+}
