@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 
 import wavefront as wf
+from wavefront.integrators.stage_list import ORDER
 
 ROOT = Path(__file__).parents[2]
 PAGES = sorted(
@@ -202,6 +203,17 @@ def test_the_packages_of_the_architecture_are_the_layers():
     assert {name for row in rows for name in row} >= modules - {"__init__", "__pycache__"}
     for below, above in pairwise(packages):
         assert max(below) <= min(above)
+
+
+def test_the_picture_of_the_loop_has_its_stages():
+    """In boxes with the points of features that act after them, and in the words of its description."""
+    texts = re.findall(r"<text[^>]*>([^<]*)</text>", (ROOT / "docs" / "way_of_a_ray.svg").read_text("utf-8"))
+    words = (ROOT / "docs" / "architecture.md").read_text("utf-8").partition("A wave has the stages ")[2]
+    named = re.split(r", | and ", words.partition(", which leads")[0])
+    assert named == [stage.__name__ for stage, _ in ORDER]
+    for stage, points in ORDER:
+        box = texts[texts.index(stage.__name__) :][:3]
+        assert not points or box[2] == ", ".join(points), stage.__name__
 
 
 def test_every_public_name_is_written_about():
