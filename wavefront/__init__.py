@@ -92,6 +92,7 @@ if TYPE_CHECKING:
         measure_flux,
     )
     from .media import GridMedium, HenyeyGreenstein, Isotropic, Medium, PhaseFunction, PhaseMix, Rayleigh
+    from .motion import Keyframes, Motion
     from .sampling import warp
     from .sampling.filters import BoxFilter, GaussianFilter, TentFilter
     from .sampling.sampler import Sampler
@@ -190,6 +191,7 @@ _HOMES = {  # of the public names: a module is imported when one of its names is
         "load_points load_weather measure measure_flux"
     ),
     ".media": "GridMedium HenyeyGreenstein Isotropic Medium PhaseFunction PhaseMix Rayleigh",
+    ".motion": "Keyframes Motion",
     ".sampling.filters": "BoxFilter GaussianFilter TentFilter",
     ".sampling.sampler": "Sampler",
     ".scene": "Scene",
@@ -256,6 +258,7 @@ __all__ = [
     "Interrupted",
     "Intersections",
     "Isotropic",
+    "Keyframes",
     "Light",
     "LightFound",
     "LightRecord",
@@ -270,6 +273,7 @@ __all__ = [
     "Mesh",
     "Mirror",
     "Mix",
+    "Motion",
     "NormalMap",
     "NullSurface",
     "OpenPBR",

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from copy import copy
-from typing import Any, Literal, TypeAlias
+from typing import Any, Literal, Self, TypeAlias
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -24,6 +24,7 @@ from ..core.errors import (
 )
 from ..core.parameter import brief
 from ..core.suggestions import Answers, suggests_keywords
+from ..motion import Motion, Moving, product
 from ..sampling.tiles import PictureTiles, Tiles
 from .distortion import Distortion
 from .projection import Orthographic, Panorama, Perspective, Projection
@@ -45,7 +46,7 @@ def register_framing(choose: Callable[..., Any]) -> None:
     _FRAMED[:] = [choose]
 
 
-class Camera(Answers):
+class Camera(Moving, Answers):
     """A camera. Use `Camera.look_at` or one of the other class methods.
 
     Attributes
@@ -61,6 +62,10 @@ class Camera(Answers):
     window
         (x0, y0, x1, y1) in pixels of the whole picture: the part that is rendered. Column x1 and row y1 are
         not part of it.
+    motion, moves, time_span
+        Where it goes, a `Motion` from camera space ("opengl") to the world (None: nowhere); whether it moves,
+        and from when to when, seconds. Its origin and rotation are those of its start; `at` gives other
+        times.
 
     Examples
     --------
@@ -159,7 +164,7 @@ class Camera(Answers):
     @suggests_keywords
     def from_matrix(
         cls,
-        cam_to_world: ArrayLike,
+        cam_to_world: ArrayLike | Motion,
         fov: float = 40,
         *,
         size: ImageSize = (512, 512),
@@ -174,7 +179,7 @@ class Camera(Answers):
         Parameters
         ----------
         cam_to_world
-            (4, 4) or (3, 4): rotation and position.
+            (4, 4) or (3, 4): rotation and position. Or a motion, such as `Keyframes`: the camera moves.
         fov, size, aperture, focus, shift, crop
             As for `look_at`; with an aperture, `focus` must be given.
         convention
@@ -187,14 +192,14 @@ class Camera(Answers):
             If the matrix scales, shears or mirrors, or an argument is out of range.
         """
         signs = _axes_of(convention)
-        axes, eye = _rigid("cam_to_world", cam_to_world)
-        return cls(
-            eye,
-            axes * signs,
-            Perspective(field_of_view(fov), shift=shift, aperture=aperture, focus=focus),
-            size,
-            crop,
-        )
+        if isinstance(cam_to_world, Motion):
+            _rigid("cam_to_world", cam_to_world.at(cam_to_world.start))
+            axes, eye = np.eye(3), np.zeros(3)
+        else:
+            axes, eye = _rigid("cam_to_world", cam_to_world)
+        lens = Perspective(field_of_view(fov), shift=shift, aperture=aperture, focus=focus)
+        camera = cls(eye, axes * signs, lens, size, crop)
+        return camera.transformed(cam_to_world) if isinstance(cam_to_world, Motion) else camera
 
     @classmethod
     @suggests_keywords
@@ -382,7 +387,7 @@ class Camera(Answers):
         Parameters
         ----------
         origin
-            The camera is moved there. It is not turned, unless there is a target.
+            The camera is moved there. It is not turned, unless there is a target. One that moves then stays.
         target
             It is turned to this point, which is in focus unless `focus` says otherwise.
         up
@@ -415,7 +420,58 @@ class Camera(Answers):
         lens |= {name: value for name, value in given.items() if value is not None}
         projection = self.projection.replaced(**lens) if lens else self.projection
         window = self.window if size is None and crop is None else crop
-        return Camera(eye, axes, projection, self.resolution if size is None else size, window)
+        camera = Camera(eye, axes, projection, self.resolution if size is None else size, window)
+        return self._carrying(camera) if origin is target is up is None else camera
+
+    # --- Time -----------------------------------------------------------------------------------
+
+    def transformed(self, matrix: ArrayLike | Motion) -> Self:
+        """Return the camera, moved by a matrix, or by a motion that carries it.
+
+        Parameters
+        ----------
+        matrix
+            (4, 4) rotation and translation, or a motion of such, as `Keyframes`. A scale has no effect on
+            what the camera sees, but on where it stands.
+
+        Raises
+        ------
+        SceneError
+            If it is malformed, or flattens the camera's axes.
+
+        Examples
+        --------
+        >>> camera = wf.Camera.look_at((0, 0, 4), (0, 0, 0))
+        >>> aside = np.eye(4)
+        >>> aside[0, 3] = 1
+        >>> dolly = camera.transformed(wf.Keyframes([0, 2], [np.eye(4), aside]))
+        >>> dolly.at(1).origin.tolist()
+        [0.5, 0.0, 4.0]
+        """
+        own = self.to_matrix() if self.motion is None else self.motion
+        moving = matrix if isinstance(matrix, Motion) else finite_array("Camera transform", matrix, (4, 4))
+        placing = product(moving, own)
+        if isinstance(placing, Motion):
+            camera = self._placed_by(placing.at(placing.start))
+            camera.motion = placing
+            return camera
+        return self._placed_by(placing)
+
+    def at(self, time: float) -> Self:
+        """Return the camera at a time, seconds; one that is still returns itself."""
+        if self.motion is None:
+            return self
+        return self._placed_by(self.motion.at(number("time", time)))
+
+    def _placed_by(self, matrix: Doubles) -> Self:
+        """Return a still camera by its matrix (4, 4) to the world, whose scale has no effect."""
+        backward, up = matrix[:3, 2], matrix[:3, 1]
+        size = np.sqrt((backward * backward).sum())
+        if not size > 0:
+            raise SceneError(f"Camera transform takes the view to {backward.tolist()}; it must not be zero")
+        camera = copy(self)
+        camera.origin, camera.rotation, camera.motion = matrix[:3, 3], _axes(backward / size, up), None
+        return camera
 
     def resized(self, size: ImageSize) -> Camera:
         """Return the same camera for another (width, height) of what it renders.
@@ -424,17 +480,22 @@ class Camera(Answers):
         """
         width, height = image_size(size)
         if self.size == self.resolution:
-            return Camera(self.origin, self.rotation, self.projection, (width, height))
+            return self._carrying(Camera(self.origin, self.rotation, self.projection, (width, height)))
         x0, y0, x1, y1 = self.window
         scale = height / (y1 - y0)
         columns, left = _rescaled(self.resolution[0], (x0 + x1) / 2, scale, width)
         rows, top = _rescaled(self.resolution[1], (y0 + y1) / 2, scale, height)
         crop = left, top, left + width, top + height
-        return Camera(self.origin, self.rotation, self.projection, (columns, rows), crop)
+        return self._carrying(Camera(self.origin, self.rotation, self.projection, (columns, rows), crop))
 
     def cropped(self, crop: Window) -> Camera:
         """Return the same camera that renders only the window (x0, y0, x1, y1) of the whole picture."""
-        return Camera(self.origin, self.rotation, self.projection, self.resolution, crop)
+        return self._carrying(Camera(self.origin, self.rotation, self.projection, self.resolution, crop))
+
+    def _carrying(self, camera: Camera) -> Camera:
+        """Return another camera at the same place, which is given the motion of this one."""
+        camera.motion = self.motion
+        return camera
 
     def scaled(self, factor: float) -> Camera:
         """Return the same camera in a scene whose lengths were multiplied by `factor`."""

@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+import gc
 import math
 import re
 import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -92,3 +95,15 @@ def check_memory(what: str, needed: int) -> None:
 def megabytes(size: float) -> str:
     """Return a number of bytes as text for messages."""
     return f"{size / 1e6:,.0f} MB"
+
+
+@contextmanager
+def unwatched() -> Iterator[None]:
+    """Make very many objects without the garbage collector looking through all of them again and again."""
+    watched = gc.isenabled()
+    gc.disable()
+    try:
+        yield
+    finally:
+        if watched:
+            gc.enable()

@@ -9,6 +9,7 @@ center. Every pdf is in solid angle.
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
+from copy import copy
 from typing import Any, ClassVar, Self
 
 import numpy as np
@@ -18,9 +19,11 @@ from ..arrays.soa import soa
 from ..arrays.state import SoA, SurfaceInteraction
 from ..arrays.vec import Bools, Doubles, Floats, Ints, Lanes, f4
 from ..colors import EFFICACY
-from ..core.errors import SceneError, exact, finite_array
+from ..core.errors import SceneError, exact, finite_array, number
 from ..film.aov_names import DEFAULT_GROUP
+from ..motion import Motion, Moving, product
 from ..shapes import Shape
+from ..shapes.transform import affine
 
 
 @soa
@@ -84,7 +87,7 @@ class Emitters(SoA):
     extent2: Doubles
 
 
-class Light(ABC):
+class Light(Moving, ABC):
     """Base class of lights: an element of `Scene(lights=...)`. Shapes with an emission need none.
 
     Examples
@@ -98,6 +101,8 @@ class Light(ABC):
     group: str = DEFAULT_GROUP  # for which layer of radiance the light counts
     efficacy: float = EFFICACY  # lm/W: what `Measurement.lux` makes of its watts, see docs/luminaires.md
     hint: ClassVar[str | None] = None  # how to turn the light to what it misses, for messages
+    _points: ClassVar[tuple[str, ...]] = ()  # attributes that are positions (3,) or (n, 3)
+    _directions: ClassVar[tuple[str, ...]] = ()  # attributes that are directions (3,), None where not given
 
     @abstractmethod
     def record(self, center: Doubles) -> LightRecord:
@@ -105,6 +110,11 @@ class Light(ABC):
 
         It has one column; that of a light with a `shape` may have one for each of its faces.
         """
+
+    @property
+    def _handed(self) -> bool:
+        """Whether it differs from its mirror image."""
+        return False
 
     @property
     def delta(self) -> bool:
@@ -115,6 +125,73 @@ class Light(ABC):
     def bounds(self) -> Doubles | None:
         """Lower and upper corner (2, 3) of the light, scene units; None if it has no position."""
         return None
+
+    def transformed(self, matrix: ArrayLike | Motion) -> Self:
+        """Return a copy that is moved and turned by an affine matrix, or by a motion that carries it.
+
+        Intensities stay, also where the matrix has a scale.
+
+        Parameters
+        ----------
+        matrix
+            (4, 4), for column vectors; or a motion, such as `Keyframes`.
+
+        Raises
+        ------
+        SceneError
+            If it is malformed, the light has no place or direction, or one that is not round would be
+            mirrored.
+
+        Examples
+        --------
+        >>> aside = np.eye(4)
+        >>> aside[0, 3] = 2
+        >>> lamp = wf.PointLight((0, 3, 0), 40).transformed(wf.Keyframes([0, 1], [np.eye(4), aside]))
+        >>> lamp.at(0.5).position.tolist(), lamp.moves
+        ([1.0, 3.0, 0.0], True)
+        """
+        if not isinstance(matrix, Motion) and not self.moves:
+            return self._transformed(affine(f"{type(self).__name__} transform", matrix))
+        own = matrix if isinstance(matrix, Motion) else affine(f"{type(self).__name__} transform", matrix)
+        placing = own if self.motion is None else product(own, self.motion)
+        assert isinstance(placing, Motion)
+        rest = vars(self).get("_rest", self)
+        light = self._placed_as(rest._transformed(placing.at(placing.start)))
+        vars(light).update(motion=placing, _rest=rest)
+        return light
+
+    def at(self, time: float) -> Self:
+        """Return the light at a time, seconds; one that is still returns itself."""
+        if self.motion is None:
+            return self
+        light = self._placed_as(vars(self)["_rest"]._transformed(self.motion.at(number("time", time))))
+        vars(light).pop("motion")
+        vars(light).pop("_rest")
+        return light
+
+    def _transformed(self, matrix: Doubles) -> Self:
+        """Return a copy that is transformed by an affine matrix (4, 4)."""
+        if not self._points and not self._directions:
+            raise SceneError(
+                f"{type(self).__name__} cannot be moved: it has neither a position nor a direction"
+            )
+        if self._handed and np.linalg.det(matrix[:3, :3]) < 0:
+            raise SceneError(f"{type(self).__name__} transform mirrors; its light would have to be mirrored")
+        light = copy(self)
+        for name in self._points:
+            points = getattr(self, name) @ matrix[:3, :3].T + matrix[:3, 3]
+            setattr(light, name, points)
+        for name in self._directions:
+            vector = getattr(self, name)
+            setattr(light, name, None if vector is None else matrix[:3, :3] @ vector)
+        return light
+
+    def _placed_as(self, other: Self) -> Self:
+        """Return a copy with the place and the directions of another light."""
+        light = copy(self)
+        for name in (*self._points, *self._directions):
+            setattr(light, name, getattr(other, name))
+        return light
 
     def scaled(self, factor: float) -> Light:
         """Return the light for a scene whose lengths were multiplied by `factor`, with the same irradiance.

@@ -134,6 +134,7 @@ class DirectionalLight(Parametrized, FarLight):
     >>> sun = wf.DirectionalLight((-1, -2, -1), irradiance=3, angle=0.53)
     """
 
+    _directions = ("direction",)
     direction: Parameter[ArrayLike] = Parameter(unit)
     irradiance: Parameter[ArrayLike] = Parameter(rgb)
     angle: Parameter[float] = Parameter(_angle, default=0.0, kw_only=True)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 from functools import lru_cache
 from itertools import pairwise
+from typing import ClassVar, Self
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -145,6 +146,7 @@ class WebLight(LightAtPoint):
     """
 
     hint = "direct the light"
+    _directions: ClassVar[tuple[str, ...]] = ("_axes",)
     position: Parameter[ArrayLike] = Parameter(position)
     intensity: Parameter[ArrayLike] = Parameter(intensity_of)
     group: Parameter[str] = Parameter(group_name)
@@ -154,6 +156,16 @@ class WebLight(LightAtPoint):
     ) -> None:
         self._web, self.position, self.intensity, self.group = web, position, intensity, group
         self._axes = axes
+
+    @property
+    def _handed(self) -> bool:
+        return True
+
+    def _transformed(self, matrix: Doubles) -> Self:
+        light = super()._transformed(matrix)
+        if "_axes" in self._directions:
+            light._axes = light._axes / np.linalg.norm(light._axes, axis=0)
+        return light
 
     @property
     def axes(self) -> Doubles:
@@ -218,6 +230,7 @@ class IESLight(WebLight):
     """
 
     hint = "direct the IESLight"
+    _directions = "direction", "c0"
     direction: Parameter[ArrayLike] = Parameter(unit)
     c0: Parameter[ArrayLike] = Parameter(unit)
 

@@ -73,6 +73,7 @@ class LightAtPoint(Parametrized, Light):
     """Base of lights at one position, with an intensity, which its subclasses declare."""
 
     delta = True
+    _points = ("position",)
     position: Any
     intensity: Any
 
@@ -188,6 +189,7 @@ class PointLights(Parametrized, Light):
     """
 
     delta = True
+    _points = ("positions",)
     positions: Parameter[ArrayLike] = Parameter(checked_positions)
     intensities: Parameter[ArrayLike] = Parameter(intensities_of)
     group: Parameter[str] = Parameter(group_name, default=DEFAULT_GROUP, kw_only=True)

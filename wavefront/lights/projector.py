@@ -62,6 +62,7 @@ class Projector(AimedLight):
     """
 
     hint = "direct the Projector, or widen its fov"
+    _directions = "direction", "up"
     position: Parameter[ArrayLike] = Parameter(position)
     picture: Parameter[Any] = Parameter(_picture)
     intensity: Parameter[ArrayLike] = Parameter(intensity_of, default=1.0)
@@ -70,6 +71,10 @@ class Projector(AimedLight):
     fov: Parameter[float] = Parameter(_fov, default=45.0, kw_only=True)
     up: Parameter[ArrayLike] = Parameter(unit, default=(0, 1, 0), kw_only=True)
     group: Parameter[str] = Parameter(group_name, default=DEFAULT_GROUP, kw_only=True)
+
+    @property
+    def _handed(self) -> bool:
+        return True
 
     def record(self, center: Doubles) -> PicturedLights:
         """Return the light as a record of one column, relative to `center` (3,)."""

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from functools import partial
-from typing import Any, Literal
+from typing import Any, ClassVar, Literal
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -170,6 +170,7 @@ def aim(name: str, position: Any, target: ArrayLike | None, direction: ArrayLike
 class AimedLight(LightAtPoint):
     """Base of lights at one position that shine along a direction, which its subclasses declare."""
 
+    _directions: ClassVar[tuple[str, ...]] = ("direction",)
     target: Any
     direction: Any
 
@@ -244,6 +245,8 @@ class SpotLight(AimedLight):
     """
 
     hint = "direct the SpotLight, or widen its cone"
+    _directions = "direction", "up"
+
     position: Parameter[ArrayLike] = Parameter(position)
     intensity: Parameter[ArrayLike] = Parameter(intensity_of)
     target: Parameter[ArrayLike | None] = Parameter(target_of, default=None, kw_only=True)
@@ -256,6 +259,10 @@ class SpotLight(AimedLight):
     picture: Parameter[Any] = Parameter(picture_of, default=None, kw_only=True)
     up: Parameter[ArrayLike] = Parameter(unit, default=(0, 1, 0), kw_only=True)
     group: Parameter[str] = Parameter(group_name, default=DEFAULT_GROUP, kw_only=True)
+
+    @property
+    def _handed(self) -> bool:
+        return self.picture is not None
 
     def record(self, center: Doubles) -> SpotLights:
         """Return the light as a record of one column, relative to `center` (3,)."""

@@ -313,7 +313,7 @@ def _ground(scene: Scene, preset: str | None, up: ArrayLike, kind: type[Diffuse]
     Outside of shadows it is as bright as the lower half of the preset's environment, so neither an edge nor a
     horizon is visible.
     """
-    low, high = scene.bounds
+    low, high = scene.reach
     radius = float(np.linalg.norm(high - low)) / 2
     vertical = turned_up(upward("up", up))[:, 1]
     if preset is None:
@@ -335,7 +335,7 @@ def _ground(scene: Scene, preset: str | None, up: ArrayLike, kind: type[Diffuse]
 
 def _ground_center(scene: Scene, vertical: Doubles) -> Doubles:
     """Return the point (3,) just below the lowest corner of a scene's box, below its center."""
-    low, high = scene.bounds
+    low, high = scene.reach
     depth = float(np.abs(vertical) @ (high - low)) / 2
     return (low + high) / 2 - vertical * depth * (1 + GROUND_GAP)
 

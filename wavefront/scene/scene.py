@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterable, Mapping, Sequence
+from copy import copy
 from typing import Any, ClassVar, Self, SupportsIndex, TypeAlias, TypeVar
 
 import numpy as np
@@ -15,15 +16,17 @@ from ..arrays.elementary import sin_cos
 from ..arrays.vec import Doubles
 from ..camera import Camera, ImageSize, check_camera, field_of_view, image_size, upward
 from ..camera.framing import FILL, Balls, fitting_offset, turned_balls
-from ..core.errors import SceneError, finite_array, in_brief, mapping
+from ..core.errors import SceneError, finite_array, in_brief, mapping, number
 from ..core.plural import plural
 from ..core.suggestions import Answers, did_you_mean, suggests_keywords
 from ..lights import Environment, Light
 from ..media import BaseMedium
+from ..motion import Moving
 from ..shapes import Group, Instance, Mesh, PrimitiveArray, Shape
 from ..shapes.instance import instance_bounds, instance_hulls
 from .html import scene_html
 from .loss import Loss
+from .moments import MOMENTS, Moments
 
 AUTO = "auto"
 FRAMING_FOV = 40.0  # degrees
@@ -75,8 +78,17 @@ class Scene(Answers):
     in the constructor. The accelerator of a render is kept with the scene, and is used again as long as no
     vertex and no sphere has moved.
 
+    A scene in which something moves is also a still one, that of its start: `render` shows this one. `at`
+    gives the scene of another time. Framing, ready-made light and ground are those of all its times.
+
     Attributes
     ----------
+    moves, start, end, duration
+        Whether something moves, from when to when, and how long, seconds.
+    animations
+        Names of the animations of its file, of which `load` reads one.
+    moment
+        The time of a scene that `at` returned; None for others.
     losses
         What of its file a scene does not show as the file says: a tuple of `Loss`. It is empty for a scene
         made in Python.
@@ -114,6 +126,11 @@ class Scene(Answers):
         self.medium = medium
         self.losses: tuple[Loss, ...] = ()  # what of its file it does not show as the file says
         self.lights_of_file: list[int] | None = None  # their ids, where it was read from a file
+        self.animations: tuple[str, ...] = ()
+        self.moment: float | None = None
+        self._whole: Scene | None = None  # of which this is a moment
+        self._moments: Moments | None = None  # what moves, and how far it reaches, once it was asked for
+        self._reach: Doubles | None = None
         self.accelerators = AcceleratorCache()  # of the last render, for the next one
         self.check()
 
@@ -212,6 +229,111 @@ class Scene(Answers):
             if isinstance(shape, Mesh | PrimitiveArray):
                 shape.check()
 
+    # --- Time -----------------------------------------------------------------------------------------
+
+    @property
+    def _moving(self) -> Moments:
+        """What moves among the shapes."""
+        if self._moments is None or not self._moments.fits(self.shapes):
+            self._moments, self._reach = Moments(self.shapes), None
+        return self._moments
+
+    @property
+    def start(self) -> float:
+        """When something begins to move, seconds; 0 if nothing does."""
+        return self._span()[0]
+
+    @property
+    def end(self) -> float:
+        """When all motions are over, seconds; 0 if there are none."""
+        return self._span()[1]
+
+    @property
+    def duration(self) -> float:
+        """How long something moves, seconds."""
+        start, end = self._span()
+        return end - start
+
+    @property
+    def moves(self) -> bool:
+        """Whether a shape, a light or the camera moves or deforms."""
+        return any(each.moves for each in self._seen) or self._moving.any
+
+    @property
+    def _seen(self) -> list[Moving]:
+        """Lights and camera."""
+        return [*self.lights, *([] if self.camera is None else [self.camera])]
+
+    def _span(self) -> tuple[float, float]:
+        spans = [*self._moving.spans, *(each.time_span for each in self._seen if each.moves)]
+        return min(span[0] for span in spans or [(0.0, 0.0)]), max(span[1] for span in spans or [(0.0, 0.0)])
+
+    def at(self, time: float) -> Scene:
+        """Return the scene at a time, in which nothing moves.
+
+        What does not move is shared with this scene: meshes, textures, and the trees of the last render. The
+        first call looks for what moves; further ones take 0.1 s for 100 000 moving instances.
+
+        Parameters
+        ----------
+        time
+            Seconds. Before and after the keys of a motion, its first and its last one hold.
+
+        Raises
+        ------
+        SceneError
+            If the time is not finite, or nothing is left to be seen at it.
+
+        Examples
+        --------
+        >>> fall = np.tile(np.eye(4), (2, 1, 1))
+        >>> fall[0, 1, 3] = 2
+        >>> ball = wf.Sphere((0, 0, 0), 1).transformed(wf.Keyframes([0, 0.5], fall))
+        >>> scene = wf.Scene([ball, wf.Plane((0, -1, 0), (0, 1, 0))])
+        >>> scene.at(0.25).shapes[0].center.tolist()
+        [0.0, 1.0, 0.0]
+        """
+        time, moving = number("time", time), self._moving
+        if not moving.any and not any(each.moves for each in self._seen):
+            return self
+        shapes = moving.at(time)
+        if not shapes:
+            raise SceneError(f"at {time:g} s the scene has no shapes: all of them have no size")
+        moment = copy(self)
+        moment._shapes = _checked(Shapes, shapes)
+        moment._lights = _checked(Lights, (light.at(time) for light in self.lights))
+        moment._camera = None if self.camera is None else self.camera.at(time)
+        if self.has_lights_of_file:
+            moment.lights_of_file = [id(each) for each in moment._lights]
+        moment.moment, moment._whole, moment._moments = time, self, None
+        return moment
+
+    @property
+    def _source(self) -> Scene:
+        """The scene with all times: this one, or the one that it is a moment of."""
+        return self if self._whole is None else self._whole
+
+    @property
+    def _samples(self) -> list[Scene]:
+        """Scenes of some times, which together reach as far as the shapes ever do."""
+        source = self._source
+        if not source._moving.any:
+            return [self]
+        return [source.at(time) for time in np.linspace(*source._span(), MOMENTS)]
+
+    @property
+    def reach(self) -> Doubles:
+        """The bounds (2, 3) of all times of the scene, or of the one that it is a moment of."""
+        samples, source = self._samples, self._source
+        if len(samples) == 1:
+            return self.bounds
+        if source._reach is None:
+            boxes = np.stack([each.bounds for each in samples])
+            source._reach = np.stack([boxes[:, 0].min(0), boxes[:, 1].max(0)])
+        return source._reach
+
+    # --- Where it is ----------------------------------------------------------------------------------
+
     @property
     def bounds(self) -> Doubles:
         """Lower and upper corner of all shapes, (2, 3), scene units."""
@@ -266,8 +388,9 @@ class Scene(Answers):
         SceneError
             If an argument is malformed or out of range.
         """
-        framed = [shape for shape in self.shapes if shape.framed]
-        if framed and len(framed) < len(self.shapes):
+        shapes = self._source.shapes
+        framed = [shape for shape in shapes if shape.framed]
+        if framed and len(framed) < len(shapes):
             return Scene(framed).framing_camera(fov, size, up=up, direction=direction)
         size = image_size(size)
         fov = field_of_view(fov)
@@ -275,7 +398,7 @@ class Scene(Answers):
         view = view_direction("direction", direction)
         if isinstance(direction, str):
             view = turn @ view
-        low, high = self.bounds
+        low, high = self.reach
         middle, reach = (low + high) / 2, float(np.linalg.norm(high - low)) / 2 or 1.0
         camera_up = turn[:, 1]
         # seen from above or below, the front is at the bottom of the picture
@@ -300,8 +423,9 @@ class Scene(Answers):
         """
         if self.emits:
             return FRAMING_VIEW
-        framed = [shape for shape in self.shapes if shape.framed]
-        if framed and len(framed) < len(self.shapes):
+        shapes = self._source.shapes
+        framed = [shape for shape in shapes if shape.framed]
+        if framed and len(framed) < len(shapes):
             return Scene(framed, up=self.up).chosen_view(up)
         turn = turned_up(self.vertical(up))
         view, normal = turn @ view_direction("view", FRAMING_VIEW), _flat_normal(*self._hull())
@@ -314,7 +438,11 @@ class Scene(Answers):
         return np.asarray(BROAD * normal + np.sqrt(1 - BROAD * BROAD) * beside)
 
     def _hull(self) -> Balls:
-        """Return balls whose convex hull holds all shapes."""
+        """Return balls whose convex hull holds all shapes, at all times."""
+        centers, radii = zip(*(each._hull_now() for each in self._samples), strict=True)
+        return np.concatenate(centers), np.concatenate(radii)
+
+    def _hull_now(self) -> Balls:
         found = [shape.hull() for shape in self.shapes if not isinstance(shape, Instance)]
         instances = [shape for shape in self.shapes if isinstance(shape, Instance)]
         found += [(points, np.zeros(len(points))) for points in instance_hulls(instances)]
@@ -359,6 +487,7 @@ def view_direction(name: str, view: ArrayLike) -> Doubles:
     return direction / np.linalg.norm(direction)
 
 
+C = TypeVar("C", bound="CheckedList[Any]")
 T = TypeVar("T")
 Importer: TypeAlias = Callable[..., Scene]  # of an object, and `smooth` as for `load`
 _IMPORTERS: dict[str, Importer] = {}  # by the package of an object's class
@@ -440,11 +569,11 @@ class CheckedList(list[T], ABC):
             hint = self.hint(items)
             raise SceneError(f"{self.name} must be a list of {self.allowed}, got {in_brief(items)}{hint}")
         found: list[T] = []
-        for number, item in enumerate(items, first):
+        for at, item in enumerate(items, first):
             elements = self.converted(item)
             if elements is None:
                 what, hint = in_brief(item), self.hint(item)
-                raise SceneError(f"{self.name}[{number}] is {what}; it must be one of {self.allowed}{hint}")
+                raise SceneError(f"{self.name}[{at}] is {what}; it must be one of {self.allowed}{hint}")
             found += elements
         return found
 
@@ -490,6 +619,13 @@ class Lights(CheckedList[Light]):
         if isinstance(item, Camera):
             return "; a camera is given as camera=..."
         return "; emitting shapes belong to the shapes" if isinstance(item, Shape) else ""
+
+
+def _checked(kind: type[C], items: Iterable[Any]) -> C:
+    """Return a list whose elements have been checked."""
+    found = kind.__new__(kind)
+    list.extend(found, items)
+    return found
 
 
 def _check_environments(lights: Sequence[Light]) -> None:

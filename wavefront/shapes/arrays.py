@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike
 from ..arrays.vec import FLOAT32_MAX, Doubles
 from ..core.errors import SceneError, as_array, exact, finite_array
 from ..materials import MaterialLike
+from ..motion import Motion
 from .base import Checked, CurvedShape
 from .colored import ColoredShape
 from .mesh import FLOAT32_MIN
@@ -59,20 +60,26 @@ class PrimitiveArray(ColoredShape, CurvedShape):
         """Radiance that leaves the surface: that of the material; None if dark."""
         return self.material.emission
 
-    def placed(self, transforms: ArrayLike) -> Self:
+    def placed(self, transforms: ArrayLike | Motion) -> Self:
         """Return copies that are moved, turned, mirrored or scaled by one factor, all in one shape.
 
         Parameters
         ----------
         transforms
             (4, 4) or (n, 4, 4) affine matrices, for column vectors; a copy for each. Texture
-            coordinates are those of shapes that were made there.
+            coordinates are those of shapes that were made there. Or a motion, by which one copy moves.
 
         Raises
         ------
         SceneError
-            If a transform is malformed, or does not scale alike in all directions.
+            If a transform is malformed, or does not scale alike in all directions, or there are several for a
+            shape that moves.
         """
+        if isinstance(transforms, Motion):
+            moving: Self = self.transformed(transforms)
+            return moving
+        if self.moves:
+            raise SceneError(f"{self.name}: moves; place each copy by itself, with transformed(...)")
         matrices, scale = similarities(f"{self.name}: transforms", transforms)
         shape = copy(self)
         for name in self._points:
@@ -83,8 +90,7 @@ class PrimitiveArray(ColoredShape, CurvedShape):
         shape.check()
         return shape
 
-    def transformed(self, matrix: ArrayLike) -> Self:
-        """Return a copy that is moved, turned, mirrored or scaled by one factor: as `placed`."""
+    def _transformed(self, matrix: ArrayLike) -> Self:
         return self.placed(finite_array(f"{self.name}: transform matrix", matrix, (4, 4)))
 
     def check(self) -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
+from copy import copy
 from typing import Any, Self
 
 import numpy as np
@@ -14,7 +15,8 @@ from ..core.errors import number, shape_of, text
 from ..core.parameter import Parameter
 from ..core.suggestions import Answers, suggests_keywords
 from ..materials import Material, MaterialLike, as_material
-from .transform import rotation, scaling, translation
+from ..motion import Motion, Moving, Still, product
+from .transform import affine, rotation, scaling, translation
 
 
 class Checked(Parameter[Any]):
@@ -33,7 +35,7 @@ class Name(Parameter[str]):
         vars(instance)[self._name] = text(f"{type(instance).__name__} name", value)
 
 
-class Shape(Answers, ABC):
+class Shape(Moving, Answers, ABC):
     """Base class of shapes: a `Mesh`, an `Instance`, or one of curved primitives, such as a `Sphere`.
 
     Attributes
@@ -42,6 +44,9 @@ class Shape(Answers, ABC):
         Used in messages.
     framed
         Whether `Scene.framing_camera` shows all of it; False for a `Plane`.
+    motion, moves, time_span
+        Where it goes, a `Motion` such as `Keyframes` (None: nowhere); whether it moves or deforms, and from
+        when to when, seconds. Its other attributes are those of its start; `at` gives other times.
 
     Examples
     --------
@@ -53,6 +58,9 @@ class Shape(Answers, ABC):
     name = Name(text)
     framed: bool = True
     _material: Material | None = None  # what was given
+    # what a user may change of a shape that moves, and has at all times
+    _given: tuple[str, ...] = ("name", "_material", "_emission", "colors")
+    _rest: Any = None  # what `motion` carries, where the shape itself is not as it was made
 
     @property
     def material(self) -> Material:
@@ -88,8 +96,8 @@ class Shape(Answers, ABC):
         corners = np.stack(np.meshgrid(*self.bounds.T), -1).reshape(-1, 3)
         return corners, np.zeros(len(corners))
 
-    @abstractmethod
-    def transformed(self, matrix: ArrayLike) -> Self:
+    @suggests_keywords
+    def transformed(self, matrix: ArrayLike | Motion) -> Any:
         """Return a copy that is transformed by an affine matrix; the shape itself does not change.
 
         Parameters
@@ -97,6 +105,7 @@ class Shape(Answers, ABC):
         matrix
             (4, 4), for column vectors: the translation is its last column. A reflection keeps the front
             side. Texture coordinates of spheres, cylinders and capsules are those of shapes made there.
+            Or a motion, such as `Keyframes`, by which the copy moves; that of a mesh is an `Instance`.
 
         Raises
         ------
@@ -108,6 +117,59 @@ class Shape(Answers, ABC):
         >>> wf.Box((0, 0, 0), 1).transformed(np.diag([2, 1, 1, 1])).bounds.tolist()
         [[-1.0, -0.5, -0.5], [1.0, 0.5, 0.5]]
         """
+        if not self.moves and not isinstance(matrix, Motion):
+            return self._transformed(matrix)
+        placing = matrix if isinstance(matrix, Motion) else affine(f"{self.name}: transform matrix", matrix)
+        return self._carried(placing)
+
+    @abstractmethod
+    def _transformed(self, matrix: ArrayLike) -> Self:
+        """Return a copy of a still shape that is transformed by an affine matrix (4, 4)."""
+
+    def _carried(self, placing: Motion | Doubles) -> Any:
+        """Return a copy that a motion carries, or a matrix where the shape moves itself."""
+        if self.motion is not None:
+            placing = product(placing, self.motion)
+        elif not isinstance(placing, Motion):
+            placing = Still(placing, *self.time_span)
+        assert isinstance(placing, Motion)
+        rest = self if self._rest is None else self._rest
+        start = min(placing.start, rest.time_span[0])
+        moving: Any = rest.at(start)._transformed(placing.at(start))
+        moving.motion, moving.deformation, moving._rest = placing, rest.deformation, rest
+        moving._keep_given(self)
+        return moving
+
+    def at(self, time: float) -> Any:
+        """Return the shape at a time, seconds; a shape that is still returns itself.
+
+        Examples
+        --------
+        >>> mesh = wf.Mesh([[(0, 0, 0), (1, 0, 0), (0, 1, 0)], [(0, 0, 4), (1, 0, 4), (0, 1, 4)]],
+        ...                [(0, 1, 2)], times=[0, 1])
+        >>> mesh.at(0.25).bounds[0].tolist()
+        [0.0, 0.0, 1.0]
+        """
+        if not self.moves:
+            return self
+        time = number("time", time)
+        shape: Any = (self if self._rest is None else self._rest)._formed(time)
+        if self.motion is not None:
+            shape = shape._transformed(self.motion.at(time))
+        shape._keep_given(self)
+        return shape
+
+    def _formed(self, time: float) -> Any:
+        """Return a still copy that has the form of a time, but for its motion."""
+        shape = copy(self)
+        shape.motion = shape._rest = shape.deformation = None
+        if self.deformation is not None:
+            vars(shape).update(self.deformation.at(time))
+        return shape
+
+    def _keep_given(self, other: Shape) -> None:
+        """Have what a user may have changed of another shape, which is the same one at another time."""
+        vars(self).update({name: value for name, value in vars(other).items() if name in self._given})
 
     def translated(self, offset: ArrayLike) -> Self:
         """Return a copy that is moved by `offset` (3,), scene units.
@@ -122,7 +184,8 @@ class Shape(Answers, ABC):
         >>> wf.Sphere((0, 0, 0), 1).translated((0, 1, 0)).center.tolist()
         [0.0, 1.0, 0.0]
         """
-        return self.transformed(translation(f"{self.name}: offset", offset))
+        moved: Self = self.transformed(translation(f"{self.name}: offset", offset))
+        return moved
 
     @suggests_keywords
     def rotated(self, axis: ArrayLike, degrees: float, about: ArrayLike = (0, 0, 0)) -> Self:
@@ -147,7 +210,8 @@ class Shape(Answers, ABC):
         >>> wf.Sphere((1, 0, 0), 0.5).rotated("z", 90).center.tolist()
         [0.0, 1.0, 0.0]
         """
-        return self.transformed(rotation(self.name, axis, degrees, about))
+        turned: Self = self.transformed(rotation(self.name, axis, degrees, about))
+        return turned
 
     def scaled(self, factor: ArrayLike) -> Self:
         """Return a copy whose lengths are multiplied, about the origin; the material is the same.
@@ -170,13 +234,15 @@ class Shape(Answers, ABC):
         """
         if shape_of(factor) == ():
             one = number(f"{self.name}: factor", factor, lambda x: x != 0, "other than 0")
-            if one > 0:
+            if one > 0 and not self.moves:
                 return self.lengths_times(one)
-        return self.transformed(scaling(f"{self.name}: factor", factor))
+        scaled: Self = self.transformed(scaling(f"{self.name}: factor", factor))
+        return scaled
 
     def lengths_times(self, factor: float) -> Self:
         """Return a copy with all lengths multiplied by a factor above 0, without other rounding."""
-        return self.transformed(scaling(f"{self.name}: factor", factor))
+        scaled: Self = self.transformed(scaling(f"{self.name}: factor", factor))
+        return scaled
 
 
 class CurvedShape(Shape):

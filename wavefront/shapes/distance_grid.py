@@ -179,8 +179,7 @@ class SignedDistanceGrid(CurvedShape):
         centers, halves = self.boxes()
         return centers.T, length(halves).astype(np.float64)
 
-    def transformed(self, matrix: ArrayLike) -> Self:
-        """Return a copy that is transformed by any affine matrix that can be inverted."""
+    def _transformed(self, matrix: ArrayLike) -> Self:
         shape = copy(self)
         shape.transform = finite_array(f"{self.name}: transform matrix", matrix, (4, 4)) @ self.transform
         return shape

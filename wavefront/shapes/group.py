@@ -2,16 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
-from typing import Self
+from collections.abc import Iterable, Sequence
+from typing import Any, Self
 
 from numpy.typing import ArrayLike
 
 from ..core.errors import SceneError, as_array, finite_array, in_brief
 from ..core.plural import plural
 from ..core.suggestions import suggests_keywords
+from ..motion import Motion
 from .base import Shape
-from .instance import Instance
+from .instance import Instance, motions_of
 from .mesh import Mesh
 from .transform import Matrix
 
@@ -56,12 +57,21 @@ class Group(tuple[Shape, ...]):
             found += shape if isinstance(shape, Group) else [shape]
         return super().__new__(cls, found)
 
+    @property
+    def moves(self) -> bool:
+        """Whether a shape moves or deforms."""
+        return any(shape.moves for shape in self)
+
+    def at(self, time: float) -> Self:
+        """Return the group at a time, seconds; one that is still returns itself."""
+        return type(self)(shape.at(time) for shape in self) if self.moves else self
+
     def __repr__(self) -> str:
         """Return the number of shapes."""
         return f"<Group of {plural(len(self), 'shape')}>"
 
     @suggests_keywords
-    def placed(self, transforms: ArrayLike, *, name: str | None = None) -> Self:
+    def placed(self, transforms: ArrayLike | Motion | Sequence[Motion], *, name: str | None = None) -> Self:
         """Return copies of all shapes, placed by affine transforms, copy by copy.
 
         Those of a mesh, or of an `Instance`, are instances, which share its arrays and its tree.
@@ -69,7 +79,8 @@ class Group(tuple[Shape, ...]):
         Parameters
         ----------
         transforms
-            (4, 4) or (n, 4, 4) matrices, as `transform` of `Instance`; a copy for each.
+            (4, 4) or (n, 4, 4) matrices, as `transform` of `Instance`; a copy for each. Or one motion, such
+            as `Keyframes`, or a list of them.
         name
             Name of all shapes of the copies; by default each keeps its own.
 
@@ -78,21 +89,29 @@ class Group(tuple[Shape, ...]):
         SceneError
             If a transform is malformed or singular, or stretches a shape that cannot be stretched.
         """
-        single = as_array("Group transforms", transforms).ndim == 2
-        matrices = finite_array("Group transforms", transforms, (4, 4) if single else (None, 4, 4))
+        motions = motions_of([transforms] if isinstance(transforms, Motion) else transforms)
+        if motions is not None:
+            moving = [[_renamed(shape.transformed(motion), name) for shape in self] for motion in motions]
+            return type(self)(shape for copy in moving for shape in copy)
+        given: Any = transforms
+        single = as_array("Group transforms", given).ndim == 2
+        matrices = finite_array("Group transforms", given, (4, 4) if single else (None, 4, 4))
         columns = [_copies(shape, matrices.reshape(-1, 4, 4), name) for shape in self]
         return type(self)(shape for row in zip(*columns, strict=True) for shape in row)
+
+
+def _renamed(shape: Shape, name: str | None) -> Shape:
+    """Return a shape with another name, unless it keeps its own."""
+    shape.name = shape.name if name is None else name
+    return shape
 
 
 def _copies(shape: Shape, matrices: Matrix, name: str | None) -> list[Shape]:
     """Return copies of a shape by matrices (n, 4, 4)."""
     if isinstance(shape, Mesh):
         return list(Instance.many(shape, matrices, name=name))
-    if isinstance(shape, Instance):
+    if isinstance(shape, Instance) and shape.motion is None:
         own = shape.material if shape.has_material else None
         label = shape.name if name is None else name
         return list(Instance.many(shape.mesh, matrices @ shape.transform, material=own, name=label))
-    copies = [shape.transformed(matrix) for matrix in matrices]
-    for each in copies:
-        each.name = shape.name if name is None else name
-    return copies
+    return [_renamed(shape.transformed(matrix), name) for matrix in matrices]

@@ -2,21 +2,23 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from copy import copy
-from typing import Self
+from typing import Any, Self, TypeVar
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ..arrays.vec import FLOAT32_MAX, Bools, Doubles
-from ..core.errors import SceneError, finite_array, in_brief
+from ..core.errors import SceneError, finite_array, in_brief, number
+from ..core.memory import unwatched
 from ..core.suggestions import suggests_keywords
 from ..materials import Material, MaterialLike, as_material
+from ..motion import Motion, Together, product
 from ..textures.base import BaseTexture
 from .base import Checked, Shape
 from .mesh import Mesh, check_range
-from .transform import moved, moved_tangents
+from .transform import Matrix, affine, moved, moved_tangents
 
 SINGULAR = 1e-12  # least scale of a transform along an axis, relative to the greatest
 MOST_PLACED = 1 << 16  # vertices that are transformed at once
@@ -26,9 +28,7 @@ CERTAINLY_REGULAR = 1e-6  # above this value, a cheap bound of that ratio is suf
 
 def _invertible(name: str, value: ArrayLike) -> Doubles:
     """Return a (4, 4) affine matrix that can be inverted."""
-    matrix = finite_array(name, value, (4, 4))
-    if not np.array_equal(matrix[3], [0, 0, 0, 1]):
-        raise SceneError(f"{name} has the last row {matrix[3].tolist()}; it must be [0, 0, 0, 1]")
+    matrix = affine(name, value)
     stretch = np.linalg.svd(matrix[:3, :3], compute_uv=False)
     if not stretch[2] > SINGULAR * stretch[0]:
         raise SceneError(
@@ -36,6 +36,17 @@ def _invertible(name: str, value: ArrayLike) -> Doubles:
             f"along another; their ratio must be above {SINGULAR:g}"
         )
     return matrix
+
+
+class Placing(Checked):
+    """The transform of an instance: a motion that is assigned is kept beside the matrix of its start."""
+
+    def __set__(self, instance: Any, value: Any) -> None:
+        """Store the matrix, and the motion, if it is one."""
+        motion = value if isinstance(value, Motion) else None
+        super().__set__(instance, value if motion is None else motion.at(motion.start))
+        if motion is not None or instance.motion is not None:
+            instance.motion = motion
 
 
 class Instance(Shape):
@@ -50,7 +61,8 @@ class Instance(Shape):
         The mesh; instances of one mesh share the object.
     transform
         (4, 4) affine matrix from the mesh's coordinates to the scene's, for column vectors: the translation
-        is its last column. It must be invertible. A reflection keeps the front side.
+        is its last column. It must be invertible. A reflection keeps the front side. Or a `Motion`, such as
+        `Keyframes`: the attribute is then its matrix at its start, and `motion` is the motion.
     material
         The `Material` or `Bsdf` of this instance; by default the material of the mesh.
     name
@@ -69,13 +81,13 @@ class Instance(Shape):
     >>> scene = wf.Scene([wf.Instance(leaf, np.eye(4)), wf.Instance(leaf, moved)])
     """
 
-    transform = Checked(_invertible)
+    transform = Placing(_invertible)
 
     @suggests_keywords
     def __init__(
         self,
         mesh: Mesh,
-        transform: ArrayLike,
+        transform: ArrayLike | Motion,
         *,
         material: MaterialLike | None = None,
         name: str | None = None,
@@ -95,7 +107,7 @@ class Instance(Shape):
     def many(
         cls,
         mesh: Mesh,
-        transforms: ArrayLike,
+        transforms: ArrayLike | Sequence[Motion],
         *,
         material: MaterialLike | None = None,
         name: str | None = None,
@@ -107,7 +119,7 @@ class Instance(Shape):
         mesh, material, name
             As for `Instance`.
         transforms
-            (n, 4, 4) the matrices, as `transform` of `Instance`.
+            (n, 4, 4) the matrices, as `transform` of `Instance`; or n motions.
 
         Raises
         ------
@@ -117,18 +129,19 @@ class Instance(Shape):
         if not isinstance(mesh, Mesh):
             raise SceneError(f"{name or 'instance'}: mesh must be a wf.Mesh, got {in_brief(mesh)}")
         label = mesh.name if name is None else name
-        matrices = finite_array(f"{label}: transforms", transforms, (None, 4, 4))
+        motions = motions_of(transforms)
+        given: Any = transforms if motions is None else Together(motions).at_starts()
+        matrices = finite_array(f"{label}: transforms", given, (None, 4, 4))
         bad = np.flatnonzero(~can_place(mesh, matrices))
         if bad.size:
             cls(mesh, matrices[bad[0]], name=f"{label}: transforms[{bad[0]}]")  # raises
         shared = None if material is None else as_material(f"{label}: material", material)
-        out = []
-        for matrix in matrices:
-            instance = cls.__new__(cls)
-            instance.name, instance.mesh = label, mesh
-            vars(instance)["transform"] = matrix  # it has been checked
-            instance.material = shared
-            out.append(instance)
+        instance = cls.__new__(cls)
+        instance.name = label
+        vars(instance).update(mesh=mesh, _material=shared)
+        out = placed_together([instance] * len(matrices), matrices, {})  # which have been checked
+        for each, motion in zip(out, motions or (), strict=False):
+            each.motion = motion
         return out
 
     def __repr__(self) -> str:
@@ -160,12 +173,39 @@ class Instance(Shape):
         mesh.tangents = moved_tangents(self.transform, mesh.tangents)
         return mesh
 
-    def transformed(self, matrix: ArrayLike) -> Self:
-        """Return a copy that is placed by a further matrix (4, 4), as of every `Shape`."""
+    @property
+    def moves(self) -> bool:
+        """Whether it moves, or its mesh deforms."""
+        return self.motion is not None or self.mesh.moves
+
+    @property
+    def time_span(self) -> tuple[float, float]:
+        """When it begins and ends to move or its mesh to deform, seconds, as of every shape."""
+        (start, end), (first, last) = super().time_span, self.mesh.time_span
+        return min(start, first), max(end, last)
+
+    def at(self, time: float) -> Self:
+        """Return the instance at a time, seconds; one that is still returns itself."""
+        if not self.moves:
+            return self
+        matrix = self.transform if self.motion is None else self.motion.at(number("time", time))
+        return self.placed_as(self.mesh.at(time), matrix)
+
+    def placed_as(self, mesh: Mesh, matrix: Matrix) -> Self:
+        """Return a still copy of another mesh, by a matrix (4, 4) that is known to be good."""
+        return placed_together([self], [matrix], {id(self.mesh): mesh})[0]
+
+    def _transformed(self, matrix: ArrayLike) -> Self:
         placing = _invertible(f"{self.name}: transform matrix", matrix)
         instance = copy(self)
         instance.transform = placing @ self.transform
         check_range(self.name, _placed(instance.transform, self.mesh.vertices).T)
+        return instance
+
+    def _carried(self, placing: Motion | Doubles) -> Self:
+        instance = copy(self)
+        own = self.transform if self.motion is None else self.motion
+        instance.transform = product(placing, own)
         return instance
 
     def with_mesh(self, factor: float, mesh: Mesh, own: float) -> Instance:
@@ -183,6 +223,44 @@ class Instance(Shape):
         instance.transform[:3, :3] *= factor / own
         instance.transform[:3, 3] *= factor
         return instance
+
+
+I = TypeVar("I", bound=Instance)
+
+
+def placed_together(
+    instances: Sequence[I], matrices: Matrix | Sequence[Matrix], forms: Mapping[int, Mesh]
+) -> list[I]:
+    """Return still copies of instances.
+
+    Parameters
+    ----------
+    instances
+        n of them.
+    matrices
+        (n, 4, 4), which are not checked.
+    forms
+        By the ids of their meshes, others in their place.
+    """
+    out = []
+    with unwatched():
+        for old, matrix in zip(instances, matrices, strict=True):
+            instance, values = object.__new__(type(old)), vars(old).copy()
+            values["transform"] = matrix
+            values.pop("motion", None)
+            if forms:
+                values["mesh"] = forms.get(id(old.mesh), old.mesh)
+            instance.__dict__ = values
+            out.append(instance)
+    return out
+
+
+def motions_of(transforms: Any) -> list[Motion] | None:
+    """Return a list of motions, None for anything else, such as matrices."""
+    if isinstance(transforms, list | tuple) and transforms:
+        found = [each for each in transforms if isinstance(each, Motion)]
+        return found if len(found) == len(transforms) else None
+    return None
 
 
 def can_place(mesh: Mesh, transforms: Doubles) -> Bools:
@@ -210,8 +288,8 @@ def instance_bounds(instances: Sequence[Instance]) -> Doubles:
     """Return the `bounds` of instances, (n, 2, 3); instances of one mesh are computed together."""
     out = np.empty((len(instances), 2, 3))
     numbers: dict[int, list[int]] = {}  # by mesh
-    for number, instance in enumerate(instances):
-        numbers.setdefault(id(instance.mesh), []).append(number)
+    for at, instance in enumerate(instances):
+        numbers.setdefault(id(instance.mesh), []).append(at)
     for members in numbers.values():
         mesh = instances[members[0]].mesh
         used = np.flatnonzero(np.bincount(mesh.faces.ravel(), minlength=len(mesh.vertices)))
@@ -219,7 +297,7 @@ def instance_bounds(instances: Sequence[Instance]) -> Doubles:
         step = max(1, MOST_PLACED // used.size)
         for begin in range(0, len(members), step):
             some = members[begin : begin + step]
-            transforms = np.stack([instances[number].transform for number in some])
+            transforms = np.stack([instances[at].transform for at in some])
             with np.errstate(over="ignore", invalid="ignore"):
                 placed = transforms[:, :3, :3] @ vertices + transforms[:, :3, 3:]
             out[some, 0], out[some, 1] = placed.min(2), placed.max(2)

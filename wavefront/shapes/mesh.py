@@ -10,13 +10,15 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..arrays.vec import FLOAT32_MAX, Doubles, Ints, cross, spans
-from ..core.errors import SceneError, as_array, finite_array, flag, warn_caller
+from ..core.errors import SceneError, as_array, finite_array, flag, shape_of, warn_caller
 from ..core.plural import plural
 from ..core.suggestions import suggests_keywords
 from ..materials import Material, MaterialLike
+from ..motion import Motion
 from ..textures.parameter import Color, color
 from .base import Checked
 from .colored import ColoredShape, mapped_colors
+from .over_time import over_time
 from .smoothing import AUTO, CREASE, check_smooth, crease_normals, facet_normals, split_vertices
 from .transform import moved, moved_tangents
 from .winding import settled
@@ -118,6 +120,10 @@ class Mesh(ColoredShape):
         averages only faces that are within this angle of each other. "auto" is the angle for files, 60°.
         Vertices at one position count as one. Vertices on creases are split, so that the mesh may have more
         of them. Not with `normals`.
+    times
+        (t,) seconds, rising, of vertices (t, n, 3), and of normals (t, n, 3) if any: the mesh deforms.
+        Between them vertices move straight on. `vertices` is then the form of the start; `at` returns others,
+        each with its own computed normals.
 
     cmap, clim
         Then `colors` are numbers, one each, that a colormap of matplotlib shows, by its name, such as
@@ -145,6 +151,8 @@ class Mesh(ColoredShape):
     normals = Checked(_vectors)
     uvs, uvs1 = Checked(_coordinates), Checked(_coordinates)
     tangents = Checked(partial(_vectors, width=4))
+    _smooth: bool | float | str | None = None  # of computed normals, where it deforms
+    _given = "name", "_material", "_emission", "two_sided"
 
     @suggests_keywords
     def __init__(
@@ -164,16 +172,20 @@ class Mesh(ColoredShape):
         smooth: bool | float | str = False,
         cmap: Any = None,
         clim: ArrayLike | None = None,
+        times: ArrayLike | None = None,
     ) -> None:
         self.name = name
-        self.vertices = vertices
+        if times is not None:
+            _check_forms(name, vertices, normals, tangents)
+        start, self.deformation = over_time(name, times, {"vertices": vertices, "normals": normals})
+        self.vertices = start["vertices"]
         self.faces = faces
-        self.normals = normals
+        self.normals = start["normals"]
         self.uvs, self.uvs1 = uvs, uvs1
         self.tangents = tangents
         self.colors = mapped_colors(name, colors, cmap, clim)
         self.check()
-        if self.normals is not None and self.tangents is None:
+        if self.normals is not None and self.tangents is None and self.deformation is None:
             self.faces, self.normals = settled(name, self.vertices, self.faces, self.normals)
         self._warn_of_zero_area()
         if check_smooth(f"{name}: smooth", smooth) is not False:
@@ -241,6 +253,10 @@ class Mesh(ColoredShape):
         """
         smooth = check_smooth(f"{self.name}: smooth", smooth)
         self.normals = self.tangents = None
+        if self.deformation is not None:  # each form gets its own
+            self._rest = copy(self if self._rest is None else self._rest)
+            self._rest.normals = self._rest.tangents = self._rest._rest = None
+            self._rest._smooth = smooth
         if smooth is False:
             return
         degrees = 180.0 if smooth is True else CREASE if smooth == AUTO else float(smooth)
@@ -269,8 +285,28 @@ class Mesh(ColoredShape):
                 f"{self.name}: dropped {plural(flat.size, 'face')} of zero area, first: face {flat[0]}"
             )
 
-    def transformed(self, matrix: ArrayLike) -> Self:
-        """Return a copy that is placed by an affine matrix (4, 4), as of every `Shape`."""
+    def with_area(self) -> Self | None:
+        """Return the mesh without the faces that have no area; None if there are no others."""
+        flat = _faces_of_zero_area(self.vertices, self.faces)
+        if not flat.size:
+            return self
+        mesh, faces = copy(self), np.delete(self.faces, flat, 0)
+        vars(mesh)["faces"] = faces  # they have been checked
+        return mesh if len(faces) else None
+
+    def _carried(self, placing: Motion | Doubles) -> Any:
+        """Return an instance that moves; or a copy by a matrix, where the mesh deforms."""
+        from .instance import Instance  # here, as an instance has a mesh
+
+        return Instance(self, placing) if isinstance(placing, Motion) else super()._carried(placing)
+
+    def _formed(self, time: float) -> Self:
+        mesh: Self = super()._formed(time)
+        if self._smooth is not None:
+            mesh.compute_normals(self._smooth)
+        return mesh
+
+    def _transformed(self, matrix: ArrayLike) -> Self:
         placing = finite_array(f"{self.name}: transform matrix", matrix, (4, 4))
         mesh = copy(self)
         mesh.vertices, mesh.faces, mesh.normals = moved(placing, self.vertices, self.faces, self.normals)
@@ -295,6 +331,19 @@ class Mesh(ColoredShape):
         used[self.faces] = True
         points = self.vertices[used]
         return points, np.zeros(len(points))
+
+
+def _check_forms(name: str, vertices: Any, normals: Any, tangents: Any) -> None:
+    """Raise a SceneError if arrays of a mesh that deforms are not given for all its times."""
+    if len(shape_of(vertices)) != 3:
+        raise SceneError(f"{name}: times are given; then vertices must have shape (t, n, 3)")
+    if normals is not None and shape_of(normals) != shape_of(vertices):
+        raise SceneError(
+            f"{name}: normals have the shape {shape_of(normals)}; of a mesh that deforms they must have that "
+            f"of its vertices, {shape_of(vertices)}"
+        )
+    if tangents is not None:
+        raise SceneError(f"{name}: deforms; then it cannot have tangents")
 
 
 def _faces_of_zero_area(vertices: Doubles, faces: Ints) -> Ints:

@@ -15,6 +15,7 @@ from ..core.suggestions import suggests_keywords
 from ..materials import MaterialLike
 from .arrays import checked_radii
 from .mesh import Mesh, positions
+from .over_time import over_time
 from .segments import Capsules
 from .spheres import Spheres
 
@@ -33,21 +34,22 @@ def Points(
     name: str = "points",
     cmap: Any = None,
     clim: ArrayLike | None = None,
+    times: ArrayLike | None = None,
 ) -> Spheres:
     """Return a sphere at each point.
 
     Parameters
     ----------
     points
-        (n, 3) scene units; or a `trimesh.PointCloud`, a point cloud of Open3D or points of PyVista, whose
-        colors are taken if it has any.
+        (n, 3) scene units, or (t, n, 3) for several times; or a `trimesh.PointCloud`, a point cloud of Open3D
+        or points of PyVista, whose colors are taken if it has any.
     radius
         One number, or (n,), scene units. By default half of the median distance of a point to its fourth
         nearest neighbor, so that spheres on a grid touch, and of eight points or fewer to its nearest; a
         warning states it.
     colors
         (n, 3) or (n, 4), as of `Spheres`.
-    material, name, cmap, clim
+    material, name, cmap, clim, times
         As for `Spheres`.
 
     Raises
@@ -63,15 +65,19 @@ def Points(
     """
     places, given = cloud_arrays(points)
     colors = given if colors is None else colors
-    places = positions(f"{name}: points", places)
-    if not len(places):
+    start, moving = over_time(name, times, {"points": places})
+    at_start = positions(f"{name}: points", start["points"])
+    if not len(at_start):
         raise SceneError(f"{name}: points is empty; it must have at least one row")
     if radius is None:
-        radius = usual_radius(places)
-        warn_caller(f"{name}: {len(places)} points are shown as spheres of radius {radius:.3g}")
+        radius = usual_radius(at_start)
+        warn_caller(f"{name}: {len(at_start)} points are shown as spheres of radius {radius:.3g}")
     radii = checked_radii(f"{name}: radius", radius)
     with called(f"{name}: radius", f"{name}: radii"):
-        return Spheres(places, radii, colors, material=material, name=name, cmap=cmap, clim=clim)
+        centers = at_start if moving is None else places
+        return Spheres(
+            centers, radii, colors, material=material, name=name, cmap=cmap, clim=clim, times=times
+        )
 
 
 @suggests_keywords

@@ -19,6 +19,7 @@ from .arrays import PrimitiveArray
 from .base import Checked
 from .colored import mapped_colors
 from .mesh import positions
+from .over_time import over_time
 
 HULL_SIDES = 16  # of the polygons about the ends of cylinders
 
@@ -46,9 +47,11 @@ class SegmentArray(PrimitiveArray):
         colors: ArrayLike | None,
         material: MaterialLike | None,
         name: str,
+        times: ArrayLike | None,
     ) -> None:
         self.name = name
-        self.starts, self.ends = starts, ends
+        first, self.deformation = over_time(name, times, {"starts": starts, "ends": ends})
+        self.starts, self.ends = first["starts"], first["ends"]
         super().__init__(radii, colors, material, name)
 
     @property
@@ -114,6 +117,9 @@ class Cylinders(SegmentArray):
     cmap, clim
         Then `colors` are numbers, one each, that a colormap of matplotlib shows, by its name, such as
         "viridis"; and the numbers at its ends, by default the least and the greatest.
+    times
+        (t,) seconds, rising, of starts or ends (t, n, 3) that are given for several times; between them they
+        move straight on.
 
     Raises
     ------
@@ -145,9 +151,10 @@ class Cylinders(SegmentArray):
         name: str = "cylinders",
         cmap: Any = None,
         clim: ArrayLike | None = None,
+        times: ArrayLike | None = None,
     ) -> None:
         self.caps = flag(f"{name}: caps", caps)
-        super().__init__(starts, ends, radii, mapped_colors(name, colors, cmap, clim), material, name)
+        super().__init__(starts, ends, radii, mapped_colors(name, colors, cmap, clim), material, name, times)
 
     def _reach(self) -> Doubles:
         """Return how far flat ends reach, (n, 3): the radius, times the sine of axis and coordinate axis."""
@@ -205,6 +212,9 @@ class Capsules(SegmentArray):
     cmap, clim
         Then `colors` are numbers, one each, that a colormap of matplotlib shows, by its name, such as
         "viridis"; and the numbers at its ends, by default the least and the greatest.
+    times
+        (t,) seconds, rising, of starts or ends (t, n, 3) that are given for several times; between them they
+        move straight on.
 
     Raises
     ------
@@ -233,5 +243,6 @@ class Capsules(SegmentArray):
         name: str = "capsules",
         cmap: Any = None,
         clim: ArrayLike | None = None,
+        times: ArrayLike | None = None,
     ) -> None:
-        super().__init__(starts, ends, radii, mapped_colors(name, colors, cmap, clim), material, name)
+        super().__init__(starts, ends, radii, mapped_colors(name, colors, cmap, clim), material, name, times)

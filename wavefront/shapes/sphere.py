@@ -12,6 +12,7 @@ from ..arrays.vec import FLOAT32_MAX, Doubles
 from ..core.errors import SceneError, finite_array, number, rotation_matrix
 from ..core.suggestions import suggests_keywords
 from ..materials import MaterialLike
+from ..motion import Motion
 from ..textures.parameter import Color
 from .base import Checked
 from .mesh import FLOAT32_MIN
@@ -108,8 +109,7 @@ class Sphere(SphereEmission):
         """The radius as an array, (1,)."""
         return np.array([self.radius])
 
-    def transformed(self, matrix: ArrayLike) -> Self:
-        """Return a copy that is moved, turned, mirrored or scaled by one factor: as `placed`."""
+    def _transformed(self, matrix: ArrayLike) -> Self:
         return self.placed(finite_array(f"{self.name}: transform matrix", matrix, (4, 4)))
 
     def lengths_times(self, factor: float) -> Self:
@@ -118,20 +118,23 @@ class Sphere(SphereEmission):
         sphere.center, sphere.radius = self.center * factor, self.radius * factor
         return sphere
 
-    def placed(self, transform: ArrayLike) -> Self:
+    def placed(self, transform: ArrayLike | Motion) -> Self:
         """Return a copy that is moved, turned, mirrored or scaled by one factor.
 
         Parameters
         ----------
         transform
             (4, 4) affine matrix, for column vectors. A sphere with a `transform` turns with it; the texture
-            coordinates of others are those of a sphere that was made there.
+            coordinates of others are those of a sphere that was made there. Or a motion, by which it moves.
 
         Raises
         ------
         SceneError
             If the transform is malformed, or does not scale alike in all directions.
         """
+        if self.moves or isinstance(transform, Motion):
+            moving: Self = self.transformed(transform)
+            return moving
         given = finite_array(f"{self.name}: transform", transform, (4, 4))
         matrices, scale = similarities(f"{self.name}: transform", given)
         sphere = copy(self)

@@ -16,6 +16,7 @@ from .arrays import PrimitiveArray
 from .base import Checked
 from .colored import mapped_colors
 from .mesh import positions
+from .over_time import over_time
 from .sphere_emission import SphereEmission
 
 
@@ -25,7 +26,7 @@ class Spheres(SphereEmission, PrimitiveArray):
     Parameters
     ----------
     centers
-        (n, 3) scene units.
+        (n, 3) scene units; or (t, n, 3) for several times.
     radii
         (n,) or one number, scene units, above 0.
     colors
@@ -42,6 +43,8 @@ class Spheres(SphereEmission, PrimitiveArray):
     cmap, clim
         Then `colors` are numbers, one each, that a colormap of matplotlib shows, by its name, such as
         "viridis"; and the numbers at its ends, by default the least and the greatest.
+    times
+        (t,) seconds, rising, of centers that are given for several times; between them they move straight on.
 
     Raises
     ------
@@ -71,9 +74,11 @@ class Spheres(SphereEmission, PrimitiveArray):
         name: str = "spheres",
         cmap: Any = None,
         clim: ArrayLike | None = None,
+        times: ArrayLike | None = None,
     ) -> None:
         self.name = name
-        self.centers = centers
+        start, self.deformation = over_time(name, times, {"centers": centers})
+        self.centers = start["centers"]
         super().__init__(radii, mapped_colors(name, colors, cmap, clim), material, name)
         self.emission = emission
 

@@ -17,6 +17,20 @@ IDENTITY = np.eye(4)
 EVEN = 2.0**-20  # relative difference of the scales along two axes that float32 hardly shows
 
 
+def affine(name: str, value: ArrayLike) -> Matrix:
+    """Return an affine matrix (4, 4).
+
+    Raises
+    ------
+    SceneError
+        If it has another shape, an element that is not finite, or another last row.
+    """
+    matrix = finite_array(name, value, (4, 4))
+    if not np.array_equal(matrix[3], [0, 0, 0, 1]):
+        raise SceneError(f"{name} has the last row {matrix[3].tolist()}; it must be [0, 0, 0, 1]")
+    return matrix
+
+
 def similarities(name: str, value: ArrayLike) -> tuple[Matrix, Doubles]:
     """Return matrices (n, 4, 4) that keep shapes, of one (4, 4) or of n, and the factors of lengths (n,).
 

@@ -1,0 +1,156 @@
+"""Motions by keys: translation, rotation and stretch, each over time."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from ..arrays.vec import Doubles
+from ..core.errors import SceneError, finite_array
+from ..core.plural import plural
+from ..core.suggestions import suggests_keywords
+from .motion import Motion
+from .quaternions import determinants, polar, quaternions_of, rotation_of, times
+from .track import Track
+
+SINGULAR = 1e-12  # least scale of a matrix along an axis, relative to the greatest
+
+
+def rising(name: str, values: ArrayLike, least: int = 1) -> Doubles:
+    """Return times (n,), seconds, each after the one before.
+
+    Raises
+    ------
+    SceneError
+        If they are malformed, fewer than `least`, or do not rise.
+    """
+    keys = finite_array(name, values, (None,))
+    if len(keys) < least:
+        raise SceneError(f"{name} has {plural(len(keys), 'time')}; it must have at least {least}")
+    late = np.flatnonzero(np.diff(keys) <= 0)
+    if late.size:
+        at = int(late[0])
+        raise SceneError(
+            f"{name}[{at + 1}] is {keys[at + 1]:g}, after {name}[{at}] = {keys[at]:g}; times must rise"
+        )
+    return keys
+
+
+class Trs(Motion):
+    """Translation · rotation · scale, each of them given over time.
+
+    Parameters
+    ----------
+    translation
+        (k, 3) over time.
+    rotation
+        Quaternions (k, 4) over time.
+    scale
+        (k, 3) factors along the axes, or (k, 3, 3) matrices, over time.
+    """
+
+    def __init__(self, translation: Track, rotation: Track, scale: Track) -> None:
+        self.translation, self.rotation, self.scale = translation, rotation, scale
+        # a track of one key is a constant, and says nothing of when the motion is
+        tracks = [each for each in self.tracks if len(each.times) > 1] or list(self.tracks)
+        self.start, self.end = min(each.start for each in tracks), max(each.end for each in tracks)
+
+    @property
+    def tracks(self) -> tuple[Track, Track, Track]:
+        """Translation, rotation and scale."""
+        return self.translation, self.rotation, self.scale
+
+    def at_times(self, times: Doubles) -> Doubles:
+        """Return the matrices (n, 4, 4) at times (n,)."""
+        moments = np.asarray(times, np.float64)
+        return composed(*(track.at_times(moments) for track in self.tracks))
+
+
+def composed(translation: Doubles, rotation: Doubles, scale: Doubles) -> Doubles:
+    """Return matrices (n, 4, 4): translation (n, 3) · quaternion (n, 4) · scale (n, 3) or (n, 3, 3)."""
+    matrix = np.zeros((len(translation), 4, 4))
+    linear = rotation_of(rotation)
+    with np.errstate(over="ignore", invalid="ignore"):
+        matrix[:, :3, :3] = linear * scale[:, None] if scale.ndim == 2 else times(linear, scale)
+    matrix[:, :3, 3] = translation
+    matrix[:, 3, 3] = 1
+    return matrix
+
+
+class Keyframes(Trs):
+    """A motion by affine matrices at certain times, wherever a transform is taken.
+
+    Between them translation and stretch change linearly, and the rotation turns evenly the shorter way
+    (slerp). These are the parts of the polar decomposition: shear belongs to the stretch, and a mirror stays
+    one.
+
+    Parameters
+    ----------
+    times
+        (k,) seconds, rising. Before the first and after the last, their matrices hold.
+    matrices
+        (k, 4, 4) affine matrices, for column vectors.
+
+    Raises
+    ------
+    SceneError
+        If an argument is malformed, the times do not rise, a matrix is singular, or one mirrors and the next
+        one does not.
+
+    Notes
+    -----
+    A turn by 180° or more between two keys goes the shorter way: give keys between them.
+
+    Source of the polar decomposition: K. Shoemake and T. Duff, "Matrix Animation and Polar Decomposition",
+    Graphics Interface 1992.
+
+    Examples
+    --------
+    >>> right = np.eye(4)
+    >>> right[0, 3] = 2
+    >>> slide = wf.Keyframes([0, 1], [np.eye(4), right])
+    >>> slide.at(0.25)[:3, 3].tolist()
+    [0.5, 0.0, 0.0]
+    >>> scene = wf.Scene([wf.Sphere((0, 0, 0), 1).transformed(slide), wf.Plane((0, -1, 0), (0, 1, 0))])
+    >>> scene.at(0.5).shapes[0].center.tolist(), scene.duration
+    ([1.0, 0.0, 0.0], 1.0)
+    """
+
+    @suggests_keywords
+    def __init__(self, times: ArrayLike, matrices: ArrayLike) -> None:
+        keys = rising("Keyframes times", times)
+        given = finite_array("Keyframes matrices", matrices, (None, 4, 4))
+        if len(given) != len(keys):
+            raise SceneError(f"Keyframes has {plural(len(keys), 'time')} and {len(given)} matrices")
+        _check("Keyframes matrices", given)
+        rotation, stretch = polar(given[:, :3, :3])
+        self.times, self.matrices = keys, given
+        turns = Track(keys, quaternions_of(rotation), turns=True)
+        super().__init__(Track(keys, given[:, :3, 3]), turns, Track(keys, stretch))
+
+    def __repr__(self) -> str:
+        """Return the number of keys, and the times of the first and the last."""
+        return f"<Keyframes: {plural(len(self.times), 'key')} from {self.start:g} to {self.end:g} s>"
+
+
+def _check(name: str, matrices: Doubles) -> None:
+    """Raise a SceneError if a matrix (n, 4, 4) is not affine, is singular, or alone mirrors."""
+    bad = np.flatnonzero((matrices[:, 3] != (0, 0, 0, 1)).any(1))
+    if bad.size:
+        at = int(bad[0])
+        raise SceneError(f"{name}[{at}] has the last row {matrices[at, 3].tolist()}; it must be [0, 0, 0, 1]")
+    scales = np.linalg.svd(matrices[:, :3, :3], compute_uv=False)
+    bad = np.flatnonzero(~(scales[:, 2] > SINGULAR * scales[:, 0]))
+    if bad.size:
+        most, _, least = scales[bad[0]]
+        raise SceneError(
+            f"{name}[{bad[0]}] is singular: it stretches by {least:.3g} along one axis and {most:.3g} along "
+            f"another; their ratio must be above {SINGULAR:g}"
+        )
+    mirrors = determinants(matrices[:, :3, :3] / scales[:, :1, None]) < 0
+    bad = np.flatnonzero(mirrors[1:] != mirrors[:-1])
+    if bad.size:
+        raise SceneError(
+            f"{name}[{bad[0]}] and [{bad[0] + 1}]: one mirrors and the other does not; in between it would "
+            "be singular"
+        )
