@@ -32,7 +32,7 @@ def object_boxes(scene: CompiledScene, camera: Camera, shapes: ShapeTable) -> li
     Returns
     -------
     Dictionaries in the order of the shapes, with the keys "shape" (the id), "name", "visible" and "amodal":
-    boxes [x0, y0, x1, y1] in pixels, without column x1 and row y1, None where nothing is seen, and
+    boxes [x0, y0, x1, y1] of columns x0 to x1 - 1 and rows y0 to y1 - 1, None where nothing is seen, and
     "visible_fraction": of the pixels that the whole shape covers.
     """
     width, height = camera.size
