@@ -2,7 +2,7 @@
 
     python benchmarks/intervals.py [--runs 200] [--seeds 80] [scene ...]
 
-Three tables, as docs/measuring.md and docs/convergence.md have them; some minutes on an idle machine.
+Three tables, as docs/record/benchmarks.md and docs/convergence.md have them; some minutes on an idle machine.
 """
 
 from __future__ import annotations
