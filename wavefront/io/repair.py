@@ -50,6 +50,13 @@ class RawMesh:
     attributes: dict[str, Table] = field(default_factory=dict)  # (n or m, k) of scenes of Mitsuba, by name
 
 
+def with_corner_uvs(raw: RawMesh, corners: Any) -> RawMesh:
+    """Return the same mesh with the texture coordinates (k, 2) of the corners of each face."""
+    apart = with_corners_apart(raw)
+    apart.uvs = np.tile(np.asarray(corners, np.float64), (len(raw.faces), 1))
+    return apart
+
+
 def with_face_colors(raw: RawMesh, colors: Table) -> RawMesh:
     """Return the same mesh with colors (m, 4) of its faces: every corner becomes a separate vertex."""
     apart = with_corners_apart(raw)

@@ -204,6 +204,13 @@ class SceneFiles:
             check_regular(found, self.limits.file_bytes)
         return found or allowed[0]
 
+    def existing(self, reference: str, folders: Sequence[Path] | None = None) -> Path:
+        """Return the path of a file that the scene refers to and that must be there; as `find` otherwise."""
+        found = self.find(reference, folders=folders)
+        if not os.path.exists(found):  # also False for invalid names
+            raise SceneError(f"file {reference!r} is missing")
+        return found
+
     def _places(
         self, base: PathLike | None, folders: Sequence[Path] | None
     ) -> tuple[PathLike, list[Path], list[Path]]:

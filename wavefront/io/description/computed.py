@@ -81,6 +81,11 @@ def computed(function: Callable[..., Any], *parts: Value, rising: bool = True) -
     return Computed(function, *parts, limits=ends)
 
 
+def at_least(value: Value, least: float) -> Value:
+    """Return a number or a color that is not below a value; a texture is as it is."""
+    return value if isinstance(value, BaseTexture) else np.maximum(value, least)
+
+
 def clipped(value: Value, factor: float = 1.0) -> Value:
     """Return a value times a factor, clamped to [0, 1]."""
     limits = limits_of(value)

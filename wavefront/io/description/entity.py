@@ -20,6 +20,18 @@ T = TypeVar("T")
 C = TypeVar("C", bound=Callable[..., Any])
 
 
+class Limit(NamedTuple):
+    """The values that a number may have."""
+
+    holds: Callable[[float], Any]
+    text: str  # for messages: "it must be ..."
+
+
+ABOVE_0 = Limit(lambda x: x > 0, "above 0")
+CONE = Limit(lambda x: 0 < x <= 90, "above 0 and at most 90 degrees")
+BELOW_180 = Limit(lambda x: 0 < x < 180, "above 0 and below 180 degrees")
+
+
 class Maker(NamedTuple):
     """How entities of a type are converted, and which of their parameters count."""
 
@@ -228,17 +240,17 @@ class Entity:
                 raise
         return default
 
-    def number(self, name: str, default: float, holds: Any = None, limit: str = "") -> float:
+    def number(self, name: str, default: float, limit: Limit | None = None) -> float:
         """Return a number."""
 
         def read() -> float:
             value = self.one(name, default, *NUMBERS)
-            if holds is None:
+            if limit is None:
                 return number(name, value)
             found = number(name, value)
             near = round(found, DIGITS) + 0.0
-            if holds(found) or not holds(near):
-                return number(name, value, holds, limit)
+            if limit.holds(found) or not limit.holds(near):
+                return number(name, value, *limit)
             self.lost.note(name, self.label, exact(found), f"taken as {exact(near)}")
             return near
 
@@ -246,8 +258,8 @@ class Entity:
 
     def whole(self, name: str, default: int, least: int = 0, most: int = 2**31) -> int:
         """Return a whole number."""
-        limit = f"a whole number from {least} to {most}"
-        return int(self.number(name, default, lambda x: x == int(x) and least <= x <= most, limit))
+        text = f"a whole number from {least} to {most}"
+        return int(self.number(name, default, Limit(lambda x: x == int(x) and least <= x <= most, text)))
 
     def flag(self, name: str, default: bool = False) -> bool:
         """Return True or False."""

@@ -2,13 +2,24 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 
 from ...arrays.elementary import arctan2, sin_cos
 from ...arrays.vec import Doubles
 from ...camera import Camera
 from ...core.errors import SceneError
+from ...sampling.filters import BoxFilter, TentFilter
 from ...shapes.transform import Matrix
+
+FILTERS: dict[str, Any] = {"box": BoxFilter, "tent": TentFilter}
+
+
+def filter_setting(name: str, radius: float) -> Any:
+    """Return the setting of a filter: its name, where it has its usual radius."""
+    kind = FILTERS[name]
+    return name if radius == kind.radius else kind(radius)
 
 
 def half_tangent(degrees: float) -> float:

@@ -28,8 +28,8 @@ from ...textures.base import BaseTexture
 from ...textures.image import Texture
 from ...textures.normal_map import BumpMap, NormalMap
 from ..description.appearance import null_surface
-from ..description.computed import computed, product
-from ..description.entity import Entity
+from ..description.computed import at_least, computed, product
+from ..description.entity import ABOVE_0, Entity, Limit
 from ..spectra import INDICES, METALS
 from .nodes import plugin, unsupported
 from .textures import as_color, bitmap, color, roughness, scalar
@@ -86,15 +86,13 @@ def _conductor(entity: Entity) -> Material:
         if entity.type == "conductor" and "eta" not in entity.values:
             return _named(entity, Mirror(tint))
         eta, k = (color(entity, each, to, "unbounded") for each, to in (("eta", 0.0), ("k", 1.0)))
-        eta = eta if isinstance(eta, BaseTexture) else np.maximum(eta, LEAST_INDEX)
-        k = k if isinstance(k, BaseTexture) else np.maximum(k, 0)
+        k = at_least(k, 0)
     else:
         base = name.removesuffix("_palik") if name not in METALS else name
         eta, k = METALS[base]
         if base != name:
             entity.lose(f"material {name!r}; {base!r} in its place")
-        eta = np.maximum(eta, LEAST_INDEX)
-    return _named(entity, Conductor(eta, k, reflectance=tint, **facets))
+    return _named(entity, Conductor(at_least(eta, LEAST_INDEX), k, reflectance=tint, **facets))
 
 
 def _metal(entity: Entity) -> str:
@@ -217,7 +215,7 @@ def _ior(entity: Entity, name: str, default: str) -> float:
         value = entity.get(name, default)
         if isinstance(value, str):
             return INDICES[one_of(name, value.lower(), INDICES)]
-        return number(name, value, lambda x: x > 0, "above 0")
+        return number(name, value, *ABOVE_0)
 
     return entity.or_default(INDICES[default], read)
 
@@ -243,7 +241,7 @@ def _index_of_reflectance(entity: Entity) -> dict[str, Any]:
     """Return the index by specular, which is the normal reflectance over 0.08, where there is no eta."""
     if "eta" in entity.values:
         return {}
-    part = entity.number("specular", 0.5, lambda x: 0 <= x <= 1, "in [0, 1]")
+    part = entity.number("specular", 0.5, Limit(lambda x: 0 <= x <= 1, "in [0, 1]"))
     root = np.sqrt(0.08 * part)
     return {"ior": float((1 + root) / (1 - root))}
 

@@ -7,10 +7,10 @@ from __future__ import annotations
 
 import os
 import re
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 from xml.parsers.expat import ExpatError
 
 import numpy as np
@@ -29,19 +29,7 @@ from .transforms import OPERATIONS, product, vector
 _OBJECTS = (
     "scene shape bsdf emitter sensor film rfilter sampler integrator texture medium phase volume spectrum"
 )
-_OTHERS = "float integer boolean string point vector rgb transform ref include alias default path"
-OBJECTS, OTHERS = _OBJECTS.split(), _OTHERS.split()
-ATTRIBUTES = {  # of the elements that are no plugins: those that must be there, and those that may
-    **dict.fromkeys(("float", "integer", "boolean", "string", "rgb"), (("name", "value"), ())),
-    **dict.fromkeys(("point", "vector"), (("name",), ("value", "x", "y", "z"))),
-    "spectrum": (("name",), ("value", "filename")),
-    "transform": (("name",), ()),
-    "ref": (("id",), ("name",)),
-    "include": (("filename",), ("name",)),
-    "alias": (("id", "as"), ()),
-    "default": (("name", "value"), ()),
-    "path": (("value",), ()),
-}
+OBJECTS = _OBJECTS.split()
 MOST_LETTERS = 256  # of the name of a parameter $name
 UNNAMED = "_arg_"  # the names of parameters without one begin with this
 OLD_TAGS = {"luminaire": "emitter", "camera": "sensor"}  # before version 0.5
@@ -64,6 +52,32 @@ class Tag:
     attributes: dict[str, str]
     place: str  # file and line, for messages
     children: list[Tag] = field(default_factory=list)
+
+
+class File(NamedTuple):
+    """A file that is read."""
+
+    path: Path
+    depth: int = 0  # of files that include each other
+    old: bool = False  # of a version before 2
+
+
+class Child(NamedTuple):
+    """An element that is no plugin, in one that is."""
+
+    parent: Element
+    tag: Tag
+    given: dict[str, str]  # its attributes
+    file: File
+
+    @property
+    def place(self) -> str:
+        """File and line, for messages."""
+        return self.tag.place
+
+    def numbers(self, counts: tuple[int, ...]) -> list[float]:
+        """Return the numbers of its value."""
+        return numbers(self.place, self.given["name"], self.given["value"], counts)
 
 
 class Document:
@@ -105,12 +119,9 @@ class Document:
     def find(self, reference: str) -> Path:
         """Return the path of a file that the scene refers to: in its folder, or in one of a `<path>`."""
         try:
-            found = self._files.find(reference, folders=self.folders[::-1])
+            return self._files.existing(reference, self.folders[::-1])
         except SceneError as error:
             raise SceneError(str(error).removeprefix(f"{self._files.name}: ")) from error
-        if not os.path.exists(found):  # also False for invalid names
-            raise SceneError(f"file {reference!r} is missing")
-        return found
 
     def _read(self, path: Path, data: bytes, depth: int) -> Element:
         root = parsed(os.fspath(path), data, self._losses)
@@ -124,9 +135,9 @@ class Document:
             self.version = f" in Mitsuba 3; the file is of Mitsuba {version}"
         if root.name not in OBJECTS:
             raise SceneError(f"{root.place}: <{root.name}> cannot be the first element")
-        return self._object(root, path, depth, old)
+        return self._object(root, File(path, depth, old))
 
-    def _object(self, tag: Tag, path: Path, depth: int, old: bool) -> Element:
+    def _object(self, tag: Tag, file: File) -> Element:
         """Return a plugin and all that it holds."""
         given = self._substituted(tag)
         element = _element(tag, type=given.get("type", "scene" if tag.name == "scene" else ""))
@@ -137,85 +148,63 @@ class Document:
             element["id"] = given["id"]
         for child in tag.children:
             with self._losses.part(child.place):
-                self._add(element, child, path, depth, old)
-        return _upgraded(element) if old else element
+                self._add(element, child, file)
+        return _upgraded(element) if file.old else element
 
     def _ignore(self, tag: Tag, unknown: set[str]) -> None:
         """Note attributes that are unknown."""
         for each in sorted(unknown):
             self._losses.note(f"<{tag.name}> has the unknown attribute {each!r}", tag.place, done="left out")
 
-    def _add(self, parent: Element, tag: Tag, path: Path, depth: int, old: bool) -> None:
+    def _add(self, parent: Element, tag: Tag, file: File) -> None:
         """Add what a child says to a plugin's dictionary."""
-        name = OLD_TAGS.get(tag.name.lower(), tag.name.lower()) if old else tag.name
+        name = OLD_TAGS.get(tag.name.lower(), tag.name.lower()) if file.old else tag.name
         if name in OBJECTS and (name != "spectrum" or "type" in tag.attributes):
-            child = self._object(tag, path, depth, old)
-            _set(parent, self._substituted(tag).get("name", ""), child, tag, old)
+            child = self._object(tag, file)
+            _set(parent, self._substituted(tag).get("name", ""), child, tag, file.old)
             return
-        if name not in OTHERS and name != "spectrum":
+        if name not in OTHERS:
             raise SceneError(f"{tag.place}: {_unknown(name)}{self.version}")
-        given = self._substituted(tag)
-        needed, optional = ATTRIBUTES[name]
-        for each in needed:
+        given, other = self._substituted(tag), OTHERS[name]
+        for each in other.needed:
             if each not in given:
                 raise SceneError(f"{tag.place}: <{name}> has no {each}")
-        self._ignore(tag, given.keys() - {*needed, *optional})
+        self._ignore(tag, given.keys() - {*other.needed, *other.optional})
         for inner in tag.children if name != "transform" else ():
             self._losses.note(f"<{inner.name}> cannot be inside <{name}>", inner.place, done="left out")
-        if name == "include":
-            self._include(parent, given, tag, path, depth)
-        elif name == "alias":
-            self._aliases[given["as"]] = self._aliases.get(given["id"], given["id"])
-        elif name == "default":
-            if len(given["name"]) > MOST_LETTERS:
-                raise SceneError(f"{tag.place}: the name of a parameter has more than {MOST_LETTERS} letters")
-            self._values.setdefault(given["name"], given["value"])
-        elif name == "path":
-            self._add_folder(given["value"], tag, path)
-        else:
-            _set(parent, given.get("name", ""), self._value(name, given, tag), tag, old)
+        value = other.read(self, Child(parent, tag, given, file))
+        if other.is_value:
+            _set(parent, given.get("name", ""), value, tag, file.old)
 
-    def _value(self, name: str, given: dict[str, str], tag: Tag) -> Any:
-        """Return the value of a parameter."""
-        text = given.get("value", "")
-        if name == "ref":
-            return _element(tag, type="ref", id=self._aliases.get(given["id"], given["id"]))
-        if name == "string":
-            return text
-        if name == "boolean":
-            return one_of(f"{tag.place}: {given['name']}", text.strip().lower(), ("true", "false")) == "true"
-        if name == "integer":
-            try:
-                return int(text)
-            except ValueError:
-                raise SceneError(f"{tag.place}: {given['name']} is {text!r}; it must be an integer") from None
-        if name == "float":
-            return numbers(tag.place, given["name"], text, (1,))[0]
-        if name == "rgb":
-            values = numbers(tag.place, given["name"], text, (1, 3))
-            return _element(tag, type="rgb", value=values * (3 // len(values)))
-        if name == "transform":
-            return self._transform(tag)
-        if name == "spectrum":
-            if ("value" in given) == ("filename" in given):
-                raise SceneError(f"{tag.place}: <spectrum> needs a value or a filename, and not both")
-            read = {key: given[key] for key in ("value", "filename") if key in given}
-            return _element(tag, type="spectrum", **read)
-        return vector(tag.place, given["name"], given, 0.0)
+    def _reference(self, child: Child) -> Element:
+        name = child.given["id"]
+        return _element(child.tag, type="ref", id=self._aliases.get(name, name))
 
-    def _transform(self, tag: Tag) -> Matrix:
+    def _alias(self, child: Child) -> None:
+        name = child.given["id"]
+        self._aliases[child.given["as"]] = self._aliases.get(name, name)
+
+    def _default(self, child: Child) -> None:
+        name = child.given["name"]
+        if len(name) > MOST_LETTERS:
+            raise SceneError(f"{child.place}: the name of a parameter has more than {MOST_LETTERS} letters")
+        self._values.setdefault(name, child.given["value"])
+
+    def _transform(self, child: Child) -> Matrix:
         """Return the matrix of the operations that are sound."""
+        steps = child.tag.children
         try:
-            return product([(each.name, self._substituted(each), each.place) for each in tag.children])
+            return product([(each.name, self._substituted(each), each.place) for each in steps])
         except SceneError:
             matrix = np.eye(4)
-        for each in tag.children:
+        for each in steps:
             with self._losses.part(each.place), np.errstate(over="ignore", invalid="ignore"):
                 matrix = product([(each.name, self._substituted(each), each.place)]) @ matrix
         return matrix
 
-    def _include(self, parent: Element, given: dict[str, str], tag: Tag, path: Path, depth: int) -> None:
+    def _include(self, child: Child) -> None:
         """Add the content of another file."""
+        parent, tag, given, (path, depth, _) = child
         self._included += 1
         check_included(tag.place, self._files, self._included, depth)
         self.folders.append(path.parent)
@@ -226,18 +215,20 @@ class Document:
             self.folders.pop()
         included = self._read(file, self._files.read(file), depth + 1)
         if included["type"] != "scene":
-            _set(parent, given.get("name", ""), included, tag, old=False)
+            _set(parent, given.get("name", ""), included, tag)
             return
         for key, value in included.items():
             if key not in ("type", "id"):
-                _set(parent, "" if key.startswith(UNNAMED) else key, value, tag, old=False)
+                _set(parent, "" if key.startswith(UNNAMED) else key, value, tag)
 
-    def _add_folder(self, name: str, tag: Tag, path: Path) -> None:
+    def _add_folder(self, child: Child) -> None:
         """Add a folder in which files are looked for; whether they may be read is checked then."""
-        places = [each / name.replace("\\", "/") for each in (path.parent, *reversed(self.folders))]
+        name = child.given["value"]
+        folders = (child.file.path.parent, *reversed(self.folders))
+        places = [each / name.replace("\\", "/") for each in folders]
         folder = next((place for place in places if os.path.isdir(place)), None)
         if folder is None:
-            raise SceneError(f"{tag.place}: path is {name!r}; there is no such folder")
+            raise SceneError(f"{child.place}: path is {name!r}; there is no such folder")
         self.folders.append(folder)
 
     def _substituted(self, tag: Tag) -> dict[str, str]:
@@ -314,7 +305,7 @@ def _unknown(name: str) -> str:
     return f"<{name}> is no element of scenes{where}"
 
 
-def _set(parent: Element, name: str, value: Any, tag: Tag, old: bool) -> None:
+def _set(parent: Element, name: str, value: Any, tag: Tag, old: bool = False) -> None:
     """Set a parameter; without a name it gets one."""
     if not name:
         name = f"{UNNAMED}{parent.unnamed}"
@@ -339,3 +330,59 @@ def _upgraded(element: Element) -> Element:
                 (shift if key.endswith("offset") else scale)[at] = element.pop(key)
         element["to_uv"] = scale @ shift
     return element
+
+
+def _boolean(document: Document, child: Child) -> bool:
+    text = child.given["value"].strip().lower()
+    return one_of(f"{child.place}: {child.given['name']}", text, ("true", "false")) == "true"
+
+
+def _integer(document: Document, child: Child) -> int:
+    name, text = child.given["name"], child.given["value"]
+    try:
+        return int(text)
+    except ValueError:
+        raise SceneError(f"{child.place}: {name} is {text!r}; it must be an integer") from None
+
+
+def _rgb(document: Document, child: Child) -> Element:
+    values = child.numbers((1, 3))
+    return _element(child.tag, type="rgb", value=values * (3 // len(values)))
+
+
+def _spectrum(document: Document, child: Child) -> Element:
+    given = {key: child.given[key] for key in ("value", "filename") if key in child.given}
+    if len(given) != 1:
+        raise SceneError(f"{child.place}: <spectrum> needs a value or a filename, and not both")
+    return _element(child.tag, type="spectrum", **given)
+
+
+def _vector(document: Document, child: Child) -> list[float]:
+    return vector(child.place, child.given["name"], child.given, 0.0)
+
+
+class Other(NamedTuple):
+    """An element that is no plugin."""
+
+    read: Callable[[Document, Child], Any]  # returns its value, or does what it says
+    needed: tuple[str, ...] = ("name", "value")  # attributes
+    optional: tuple[str, ...] = ()
+    is_value: bool = True
+
+
+OTHERS = {
+    "float": Other(lambda document, child: child.numbers((1,))[0]),
+    "integer": Other(_integer),
+    "boolean": Other(_boolean),
+    "string": Other(lambda document, child: child.given["value"]),
+    "rgb": Other(_rgb),
+    "point": Other(_vector, ("name",), ("value", "x", "y", "z")),
+    "vector": Other(_vector, ("name",), ("value", "x", "y", "z")),
+    "spectrum": Other(_spectrum, ("name",), ("value", "filename")),
+    "transform": Other(Document._transform, ("name",)),
+    "ref": Other(Document._reference, ("id",), ("name",)),
+    "include": Other(Document._include, ("filename",), ("name",), is_value=False),
+    "alias": Other(Document._alias, ("id", "as"), is_value=False),
+    "default": Other(Document._default, is_value=False),
+    "path": Other(Document._add_folder, ("value",), is_value=False),
+}

@@ -13,7 +13,7 @@ from ...core.errors import SceneError
 from ...lights import DirectionalLight, Environment, Light, PointLight, Projector, Sky, SpotLight
 from ...scene.sun_position import sun_position
 from ...textures.base import BaseTexture
-from ..description.entity import Entity
+from ..description.entity import CONE, Entity
 from .nodes import plugin, unsupported
 from .textures import Use, color, picture, pixels
 from .transforms import to_world
@@ -38,7 +38,7 @@ def _point(entity: Entity) -> PointLight:
 @plugin("spot", "emitter", "to_world intensity texture cutoff_angle beam_width")
 def _spot(entity: Entity) -> SpotLight:
     matrix = to_world(entity)
-    cutoff = entity.number("cutoff_angle", 20.0, lambda x: 0 < x <= 90, "above 0 and at most 90 degrees")
+    cutoff = entity.number("cutoff_angle", 20.0, CONE)
     return SpotLight(
         matrix[:3, 3],
         _constant(entity, "intensity"),

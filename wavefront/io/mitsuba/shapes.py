@@ -21,11 +21,11 @@ from ...textures.base import BaseTexture
 from ...textures.image import Texture
 from ..description.computed import computed
 from ..description.conversion import textures_in
-from ..description.entity import Entity
+from ..description.entity import ABOVE_0, Entity
 from ..description.placing import facing, moved_raw
 from ..description.views import frame
 from ..joining import COLUMNS, stacked
-from ..repair import RawMesh, build, with_corners_apart
+from ..repair import RawMesh, build, with_corner_uvs
 from ..surfaces import as_meshes, ball
 from ..volumes import parsed_grid
 from .attributes import with_attribute
@@ -40,6 +40,7 @@ SIDES = 128  # of round shapes that are meshes
 ROUND = 1e-4  # relative difference of the scales along two axes that is taken for rounding
 POLES = np.array([[0.0, 0, -1], [-1, 0, 0], [0, 1, 0]])  # from the axes of a `Sphere` to those of Mitsuba
 LEAST_OPACITY = 1 / 32  # of a surface that emits, which has all of its light all the same
+CORNERS = ((0, 0), (1, 0), (0, 1))  # texture coordinates of faces that have none
 SURFACE, PARTS = "to_world flip_normals", "bsdf emitter medium sensor"
 
 
@@ -84,7 +85,7 @@ def _disk(entity: Entity) -> list[Shape]:
 )
 def _cylinder(entity: Entity) -> list[Shape]:
     start, end = entity.vector("p0", (0, 0, 0)), entity.vector("p1", (0, 0, 1))
-    radius = entity.number("radius", 1.0, lambda x: x > 0, "above 0")
+    radius = entity.number("radius", 1.0, ABOVE_0)
     if not (end - start).any():
         raise SceneError(f"p0 and p1 are both {start.tolist()}")
     axes, matrix = frame(end - start), to_world(entity)
@@ -111,7 +112,7 @@ def _cylinder(entity: Entity) -> list[Shape]:
 )
 def _sphere(entity: Entity) -> list[Shape]:
     center = entity.vector("center", (0, 0, 0))
-    radius = entity.number("radius", 1.0, lambda x: x > 0, "above 0")
+    radius = entity.number("radius", 1.0, ABOVE_0)
     matrix = to_world(entity)
     scale = np.linalg.svd(matrix[:3, :3], compute_uv=False)
     if scale[0] - scale[2] > ROUND * scale[0]:
@@ -215,7 +216,7 @@ def _mesh(entity: Entity, raw: RawMesh, of_file: bool = False, closed: bool = Fa
     entity.job.count(raw.faces)
     material, emission = _appearance(entity, closed, of_file and raw.normals is not None)
     if raw.uvs is None and {"uv", "tangent_frame"} & _reads((material, emission)):
-        raw = _with_coordinates(raw)
+        raw = with_corner_uvs(raw, CORNERS)
     name = entity.name or raw.name
     raw = replace(raw, name=name, material=material, emission=emission)
     mesh = build(entity.job.name, raw, entity.job.files.losses)
@@ -249,13 +250,6 @@ def angle_normals(vertices: Doubles, faces: Ints) -> Doubles:
     flat, angles = facet_normals(vertices, faces[there]), corner_angles(vertices[faces[there]]).ravel()
     sums = [np.bincount(corners, np.repeat(row, 3) * angles, len(vertices)) for row in flat]
     return np.nan_to_num(np.stack(sums, 1))  # of vertices that are not finite; their faces are left out
-
-
-def _with_coordinates(raw: RawMesh) -> RawMesh:
-    """Return a mesh with the coordinates that Mitsuba gives one without uv: u is 1 at the second corner."""
-    apart = with_corners_apart(raw)
-    apart.uvs = np.tile([[0.0, 0], [1, 0], [0, 1]], (len(raw.faces), 1))
-    return apart
 
 
 def _reads(thing: Any) -> set[str]:

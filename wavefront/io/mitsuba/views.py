@@ -10,10 +10,10 @@ import numpy as np
 from ...camera import Camera, Sensors, SurfaceSensors
 from ...camera.projection import Orthographic, Perspective, Projection
 from ...core.errors import SceneError, number
-from ...sampling.filters import BoxFilter, GaussianFilter, TentFilter
+from ...sampling.filters import GaussianFilter
 from ...shapes import Instance, Mesh, Shape, Sphere
-from ..description.entity import Entity
-from ..description.views import angle_of, half_tangent
+from ..description.entity import BELOW_180, Entity, Limit
+from ..description.views import FILTERS, angle_of, filter_setting, half_tangent
 from ..text_lines import numbers
 from .nodes import plugin, unsupported
 from .transforms import to_world
@@ -130,9 +130,8 @@ def _film(entity: Entity) -> tuple[tuple[int, int], Crop, Settings]:
 @plugin("box", "rfilter", "radius")
 @plugin("tent", "rfilter", "radius")
 def _filter(entity: Entity) -> Settings:
-    kind = BoxFilter if entity.type == "box" else TentFilter
-    radius = entity.number("radius", kind.radius)
-    return {"filter": entity.type if radius == kind.radius else kind(radius)}
+    radius = entity.number("radius", FILTERS[entity.type].radius)
+    return {"filter": filter_setting(entity.type, radius)}
 
 
 @plugin("gaussian", "rfilter", "stddev radius", note="ends at four times stddev")
@@ -168,7 +167,7 @@ def _integrator(entity: Entity) -> Settings:
         return dict(entity.job.convert(entity.only("integrator")))
     settings: Settings = {"max_bounces": 1}
     if entity.type != "direct":
-        depth = entity.number("max_depth", -1, lambda x: x == int(x) >= -1, "at least 0, or -1")
+        depth = entity.number("max_depth", -1, Limit(lambda x: x == int(x) >= -1, "at least 0, or -1"))
         settings["max_bounces"] = min(int(depth) - 1, ENDLESS) if depth > 0 else ENDLESS
         settings["roulette"] = entity.whole("rr_depth", 5, 1)
         if depth == 0:
@@ -229,7 +228,7 @@ def _field_of_view(entity: Entity, aspect: float) -> float:
     if "fov" in entity.values:
         if "focal_length" in entity.values:
             entity.lose("has fov and focal_length; give one of them; fov counts")
-        angle = entity.number("fov", USUAL_FOV, lambda x: 0 < x < 180, "above 0 and below 180 degrees")
+        angle = entity.number("fov", USUAL_FOV, BELOW_180)
         axis = entity.choice("fov_axis", "x", ("x", "y", "diagonal", "smaller", "larger"))
     else:
         (length,) = numbers("", "focal_length", entity.text("focal_length", "50mm").removesuffix("mm"), (1,))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -18,7 +19,7 @@ from ..description.entity import Entity, Table
 from ..spectra import METALS
 from .parser import NUMBERS, Parameter
 
-NEUTRAL = ("stdillum-D65", "illum-acesD60")
+NEUTRAL, WARM = ("stdillum-D65", "illum-acesD60"), "stdillum-A"
 # of glasses: index at 587.6 nm and Abbe number, by Schott's and Hoya's data sheets
 GLASSES = {"BK7": (1.5168, 64.2), "BAF10": (1.67, 47.1), "FK51A": (1.4866, 84.5), "LASF9": (1.8503, 32.2)}
 GLASSES |= {"F5": (1.6727, 32.2), "F10": (1.7283, 28.4), "F11": (1.7847, 25.8)}
@@ -55,37 +56,60 @@ def spectrum(entity: Entity, name: str, default: Any, use: str = "albedo") -> An
 
 
 def _spectrum(entity: Entity, name: str, default: Any, use: str) -> Any:
-    found = entity.get(name, None, "rgb", "color", "spectrum", "blackbody", "float")
-    if found is None:
-        return default
-    kind = entity.types[name]
-    if kind in ("rgb", "color", "float"):
-        color = np.ravel(found[:1])
-        color = entity.lost.within(name, color, 0.0, 1.0 if use == "albedo" else np.inf, entity.label)
-        return float(color[0]) if kind == "float" else color
-    if kind == "blackbody":
-        color = blackbody(float(found[0]))
-    elif isinstance(found[0], str):
-        if use == "light" and "illum-" in found[0] and found[0] != "stdillum-A":
-            if found[0] not in NEUTRAL:
-                entity.lose(f"{name} {found[0]!r}; white in its place")
-            return np.ones(3)
-        if found[0] == "stdillum-A":
-            color = blackbody(2856.0)
-        elif found[0] in NAMED:
-            return NAMED[found[0]]
-        else:
-            pairs = entity.job.spectrum(found[0])
-            color = spectrum_rgb(pairs, emission=use == "light", bounded=use == "albedo")
-    elif len(found) == 1:
+    found = entity.get(name, None, *SPECTRA)
+    return default if found is None else SPECTRA[entity.types[name]](entity, name, found, use)
+
+
+def _rgb(entity: Entity, name: str, found: Any, use: str) -> Any:
+    high = 1.0 if use == "albedo" else np.inf
+    color = entity.lost.within(name, np.ravel(found[:1]), 0.0, high, entity.label)
+    return float(color[0]) if entity.types[name] == "float" else color
+
+
+def _black_body(entity: Entity, name: str, found: Any, use: str) -> Any:
+    return _shining(blackbody(float(found[0])), use)
+
+
+def _sampled(entity: Entity, name: str, found: Any, use: str) -> Any:
+    """Return the color of a name, a file, pairs of wavelength and value, or one value for all."""
+    if isinstance(found[0], str):
+        return _named(entity, name, found[0], use)
+    if len(found) == 1:
         return np.ones(3) if use == "light" else float(found[0])
-    else:
-        if len(found) % 2:
-            raise SceneError(f"{name} has {len(found)} numbers; it must be pairs of wavelength and value")
-        pairs = found.reshape(-1, 2)
-        color = spectrum_rgb(pairs, emission=use == "light", bounded=use == "albedo")
+    if len(found) % 2:
+        raise SceneError(f"{name} has {len(found)} numbers; it must be pairs of wavelength and value")
+    return _of_pairs(found.reshape(-1, 2), use)
+
+
+def _named(entity: Entity, name: str, found: str, use: str) -> Any:
+    """Return the color of a spectrum that pbrt knows, or of a file."""
+    if found == WARM:
+        return _shining(blackbody(2856.0), use)
+    if use == "light" and "illum-" in found:
+        if found not in NEUTRAL:
+            entity.lose(f"{name} {found!r}; white in its place")
+        return np.ones(3)
+    return NAMED[found] if found in NAMED else _of_pairs(entity.job.spectrum(found), use)
+
+
+def _of_pairs(pairs: Any, use: str) -> Any:
+    return _shining(spectrum_rgb(pairs, emission=use == "light", bounded=use == "albedo"), use)
+
+
+def _shining(color: Any, use: str) -> Any:
+    """Return a color; that of light has the luminance 1."""
     bright = float(luminance(color))
     return color / bright if use == "light" and bright > 0 else color
+
+
+# types of parameters that may be a spectrum
+SPECTRA: dict[str, Callable[[Entity, str, Any, str], Any]] = {
+    "rgb": _rgb,
+    "color": _rgb,
+    "spectrum": _sampled,
+    "blackbody": _black_body,
+    "float": _rgb,
+}
 
 
 @dataclass

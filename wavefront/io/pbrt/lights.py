@@ -16,7 +16,7 @@ from ...lights.environment import ConstantEnvironment
 from ...lights.ies import Web, WebLight
 from ...textures.image import Texture
 from ..description.conversion import only_one
-from ..description.entity import Entity
+from ..description.entity import CONE, Entity, Limit
 from ..description.views import angle_of, half_tangent
 from ..losses import Losses
 from .entities import converts, spectrum
@@ -74,8 +74,9 @@ def _goniometric(entity: Entity) -> PointLight | WebLight:
 @converts("light", "spot")
 def _spot(entity: Entity) -> SpotLight:
     start, end = _points(entity)
-    outer = entity.number("coneangle", 30.0, lambda x: 0 < x <= 90, "above 0 and at most 90 degrees")
-    inner = outer - entity.number("conedeltaangle", 5.0, lambda x: 0 <= x <= outer, f"in [0, {outer:g}]")
+    outer = entity.number("coneangle", 30.0, CONE)
+    within = Limit(lambda x: 0 <= x <= outer, f"in [0, {outer:g}]")
+    inner = outer - entity.number("conedeltaangle", 5.0, within)
     begin, last = (float(sin_cos(np.float64(np.radians(angle)))[1]) for angle in (inner, outer))
     solid = 2 * np.pi * ((1 - begin) + (begin - last) / 2)
     return SpotLight(

@@ -29,7 +29,7 @@ from ...textures.base import BaseTexture
 from ...textures.image import Texture
 from ...textures.normal_map import BumpMap, NormalMap
 from ..description.appearance import null_surface
-from ..description.computed import Value, clipped, computed
+from ..description.computed import Value, at_least, clipped, computed
 from ..description.conversion import GRAY
 from ..description.entity import Entity
 from .entities import NAMED, converts, spectrum, unsupported
@@ -172,7 +172,7 @@ def _metal(entity: Entity, prefix: str) -> tuple[Value, Value]:
     eta, k = (
         color(entity, f"{prefix}{name}", NAMED[f"metal-Cu-{name}"], "unbounded") for name in ("eta", "k")
     )
-    return (eta if isinstance(eta, BaseTexture) else np.maximum(eta, LEAST_INDEX)), k
+    return at_least(eta, LEAST_INDEX), k
 
 
 _surface("diffuse")(lambda entity: Diffuse(_albedo(entity, "reflectance", 0.5)))

@@ -10,7 +10,7 @@ import re
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -22,19 +22,35 @@ from ..losses import Losses
 from ..sources import SceneFiles
 
 MOST = 1e100  # size of a number: the squares of larger ones overflow
-# what follows each name: s a string, w a word, n a number, m a matrix, p parameters; ? where it may be absent
+
+
+class Form(NamedTuple):
+    """What follows the name of a statement, and where it may be."""
+
+    follows: str  # s a string, w, v a word, n a number, m a matrix, p parameters; ? where it may be absent
+    in_world: bool | None = None  # after WorldBegin, before it, or both
+
+
 STATEMENTS = {
-    **dict.fromkeys(("AttributeBegin", "AttributeEnd", "TransformBegin", "TransformEnd"), ""),
-    **dict.fromkeys(("WorldBegin", "ObjectEnd", "ReverseOrientation", "Identity"), ""),
-    **dict.fromkeys(("CoordinateSystem", "CoordSysTransform", "ColorSpace", "NamedMaterial"), "s"),
-    **dict.fromkeys(("ObjectBegin", "ObjectInstance", "Include", "Import"), "s"),
-    **dict.fromkeys(("Camera", "Film", "Sampler", "Integrator", "PixelFilter", "Accelerator"), "sp"),
-    **dict.fromkeys(("Material", "MakeNamedMaterial", "MakeNamedMedium", "LightSource"), "sp"),
-    **dict.fromkeys(("AreaLightSource", "Shape", "Attribute"), "sp"),
-    **dict.fromkeys(("Transform", "ConcatTransform"), "m"),
-    **dict.fromkeys(("Translate", "Scale"), "nnn"),
-    **{"Rotate": "nnnn", "LookAt": "nnnnnnnnn", "TransformTimes": "nn", "ActiveTransform": "w"},
-    **{"Texture": "sssp", "MediumInterface": "s?", "Option": "sv"},
+    **dict.fromkeys(("Camera", "Film", "Sampler", "Integrator", "PixelFilter"), Form("sp", False)),
+    **dict.fromkeys(("AttributeBegin", "AttributeEnd", "TransformBegin", "TransformEnd"), Form("", True)),
+    **dict.fromkeys(("Material", "LightSource", "AreaLightSource", "Shape", "Attribute"), Form("sp", True)),
+    **dict.fromkeys(("NamedMaterial", "ObjectBegin", "ObjectInstance"), Form("s", True)),
+    **dict.fromkeys(("ObjectEnd", "ReverseOrientation"), Form("", True)),
+    **dict.fromkeys(("MakeNamedMaterial", "MakeNamedMedium"), Form("sp")),
+    **dict.fromkeys(("CoordinateSystem", "CoordSysTransform", "ColorSpace", "Include", "Import"), Form("s")),
+    **dict.fromkeys(("Transform", "ConcatTransform"), Form("m")),
+    **dict.fromkeys(("Translate", "Scale"), Form("nnn")),
+    "Accelerator": Form("sp", False),
+    "WorldBegin": Form("", False),
+    "Identity": Form(""),
+    "Rotate": Form("nnnn"),
+    "LookAt": Form("nnnnnnnnn"),
+    "TransformTimes": Form("nn"),
+    "ActiveTransform": Form("w"),
+    "Texture": Form("sssp"),
+    "MediumInterface": Form("s?"),
+    "Option": Form("sv"),
 }
 V2 = ("SurfaceIntegrator", "VolumeIntegrator", "Renderer", "Volume", "VolumeRegion")
 OLD = dict.fromkeys(V2, "; it is one of pbrt-v2, and this reads pbrt-v4")
@@ -195,7 +211,7 @@ class _Text:
         words: list[str] = []
         numbers: list[float] = []
         parameters: dict[str, Parameter] = {}
-        for kind in STATEMENTS[name]:
+        for kind in STATEMENTS[name].follows:
             if kind == "s" or (kind == "?" and self._peek().startswith('"')):
                 words.append(self._string(name))
             elif kind in "wv":

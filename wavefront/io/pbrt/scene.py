@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -23,13 +22,10 @@ from ..sources import SceneFiles
 from . import lights, materials, textures  # noqa: F401  they fill the table
 from .entities import Job, retype, values_of
 from .older import upgrade
-from .parser import Parameter, Statement, statements
+from .parser import STATEMENTS, Parameter, Statement, statements
 from .shapes import place, place_object
 from .views import exposure_of, mirror_of
 
-OPTIONS = ("Camera", "Film", "Sampler", "Integrator", "PixelFilter", "Accelerator", "WorldBegin")
-WORLD = "AttributeBegin AttributeEnd Attribute TransformBegin TransformEnd ReverseOrientation Material"
-WORLD_ONLY = f"{WORLD} NamedMaterial LightSource AreaLightSource Shape ObjectBegin ObjectEnd ObjectInstance"
 KINDS = {"Camera": "camera", "Film": "film", "Sampler": "sampler", "Integrator": "integrator"}
 TARGETS = ("shape", "light", "material", "medium", "texture")
 HARMLESS = "disablepixeljitter disabletexturefiltering disablewavelengthjitter msereferenceimage"
@@ -82,10 +78,9 @@ class Reader:
             If it cannot be where it is, or what it names is not there.
         """
         name = statement.name
-        if name in OPTIONS and self.in_world:
-            raise SceneError(f"{name} must come before WorldBegin")
-        if name in WORLD_ONLY.split() and not self.in_world:
-            raise SceneError(f"{name} must come after WorldBegin")
+        wanted = STATEMENTS[name].in_world
+        if wanted is not None and wanted != self.in_world:
+            raise SceneError(f"{name} must come {'after' if wanted else 'before'} WorldBegin")
         if name in TRANSFORMS:
             self._transform(TRANSFORMS[name](statement.numbers), whole=name in ("Identity", "Transform"))
         else:
@@ -312,14 +307,7 @@ def read_scene(files: SceneFiles, data: bytes, read_mesh: Callable[[Path], list[
     SceneError
         If nothing of it can be shown, or a limit is passed. What is damaged is noted with file and line.
     """
-
-    def find(reference: str) -> Path:
-        path = files.find(reference)
-        if not os.path.exists(path):  # also False for invalid names
-            raise SceneError(f"file {reference!r} is missing")
-        return path
-
-    reader = Reader(Job(files.name, files, find, read_mesh))
+    reader = Reader(Job(files.name, files, files.existing, read_mesh))
     reader.job.instead["film"] = ((1280, 720), None), "the default in its place"
     for statement in statements(files, Path(files.name), data):
         with files.losses.part(statement.place), placed(statement.place):

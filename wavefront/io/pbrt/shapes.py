@@ -16,9 +16,9 @@ from ...shapes.transform import EVEN, Matrix, is_even
 from ...textures.base import BaseTexture
 from ..description.computed import clipped, computed, product
 from ..description.conversion import placed, textures_in
-from ..description.entity import Entity
+from ..description.entity import ABOVE_0, Entity, Limit
 from ..description.placing import facing, in_range, moved_raw
-from ..repair import RawMesh, build, existing, with_corners_apart
+from ..repair import RawMesh, build, existing, with_corner_uvs, with_corners_apart
 from ..surfaces import RINGS, SIDES, over_square
 from ..trimesh_library import import_trimesh
 from .entities import Job, converts, unsupported
@@ -26,6 +26,7 @@ from .mappings import Mapped, Mapping
 from .materials import material_of
 from .textures import scalar
 
+TURN = Limit(lambda x: 0 < x <= 360, "above 0 and at most 360 degrees")
 ROUND = 1e-5  # relative difference of the scales along two axes that is taken for rounding
 POINTS, PAIRS, NORMALS = ("point3", "point"), ("point2", "float"), ("normal3", "normal")
 
@@ -63,7 +64,7 @@ def _cylinder(entity: Entity) -> RawMesh:
 @converts("shape", "disk")
 def _disk(entity: Entity) -> RawMesh:
     radius, turns, height = _radius(entity), _turns(entity), entity.number("height", 0.0)
-    inner = entity.number("innerradius", 0.0, lambda x: 0 <= x < radius, f"from 0 to below {radius:g}")
+    inner = entity.number("innerradius", 0.0, Limit(lambda x: 0 <= x < radius, f"from 0 to below {radius:g}"))
 
     def point(u: Doubles, v: Doubles) -> tuple[Doubles, None]:
         sin, cos = sin_cos_turns(u * turns)
@@ -87,9 +88,7 @@ def _bilinear_mesh(entity: Entity) -> RawMesh:
     if (np.abs((np.cross(b - a, c - a) * (d - a)).sum(1)) > 1e-6 * size**3).any():
         entity.lose("the curvature of its patches; two triangles for each")
     if raw.uvs is None:
-        raw = replace(
-            with_corners_apart(raw), uvs=np.tile([[0.0, 0], [1, 0], [0, 1], [1, 1]], (len(patches), 1))
-        )
+        raw = with_corner_uvs(raw, ((0, 0), (1, 0), (0, 1), (1, 1)))
         patches = raw.faces.reshape(-1, 4)
     return replace(raw, faces=patches[:, [0, 1, 3, 0, 3, 2]].reshape(-1, 3))
 
@@ -125,11 +124,11 @@ unsupported("shape", "curve")
 
 
 def _radius(entity: Entity) -> float:
-    return entity.number("radius", 1.0, lambda x: x > 0, "above 0")
+    return entity.number("radius", 1.0, ABOVE_0)
 
 
 def _turns(entity: Entity) -> float:
-    return entity.number("phimax", 360.0, lambda x: 0 < x <= 360, "above 0 and at most 360 degrees") / 360
+    return entity.number("phimax", 360.0, TURN) / 360
 
 
 def _arrays(entity: Entity, corners: int) -> RawMesh:
@@ -236,8 +235,7 @@ def _with_coordinates(entity: Entity, raw: RawMesh) -> RawMesh:
     parts = raw.material, raw.emission
     mappings = _mappings(parts)
     if raw.uvs is None and textures_in(parts):
-        uvs = np.tile([[0.0, 0], [1, 0], [1, 1]], (len(raw.faces), 1))  # of each triangle, as in pbrt
-        raw = replace(with_corners_apart(raw), uvs=uvs)
+        raw = with_corner_uvs(raw, ((0, 0), (1, 0), (1, 1)))  # as in pbrt
     if mappings:
         first, *more = mappings.values()
         if more:

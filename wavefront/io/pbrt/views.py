@@ -9,10 +9,10 @@ import numpy as np
 from ...camera import Camera
 from ...camera.projection import Orthographic, Panorama, Perspective, Projection
 from ...core.errors import SceneError, exact
-from ...sampling.filters import BoxFilter, GaussianFilter, TentFilter
+from ...sampling.filters import GaussianFilter
 from ...shapes.transform import Matrix
-from ..description.entity import Entity
-from ..description.views import angle_of, half_tangent
+from ..description.entity import ABOVE_0, BELOW_180, Entity
+from ..description.views import angle_of, filter_setting, half_tangent
 from .entities import converts, unsupported
 
 Settings = dict[str, Any]
@@ -69,7 +69,7 @@ def _camera(entity: Entity) -> Camera:
     else:
         if entity.type != "perspective":
             entity.lose("a perspective camera in its place")
-        angle = entity.number("fov", 90.0, lambda x: 0 < x < 180, "above 0 and below 180 degrees")
+        angle = entity.number("fov", 90.0, BELOW_180)
         half = half_tangent(angle) * (y1 - y0) / 2
         distance = entity.number("focaldistance", 1e6)
         lens = Perspective(
@@ -84,7 +84,7 @@ def _camera(entity: Entity) -> Camera:
 
 def _window(entity: Entity, aspect: float) -> tuple[float, ...]:
     """Return the left, right, lower and upper edge of the screen: 1 is at half the angle of view."""
-    aspect = entity.number("frameaspectratio", aspect, lambda x: x > 0, "above 0")
+    aspect = entity.number("frameaspectratio", aspect, ABOVE_0)
     given = entity.get("screenwindow", None, "float")
     if given is None:
         wide, high = max(aspect, 1.0), max(1 / aspect, 1.0)
@@ -102,7 +102,7 @@ def exposure_of(film: Entity | None, camera: Entity | None) -> float:
         if not time > 0:
             camera.lose(f"is open for {exact(time)}; it must be above 0; 1 in its place")
             time = 1.0
-    return time * (1.0 if film is None else film.number("iso", 100.0, lambda x: x > 0, "above 0") / 100)
+    return time * (1.0 if film is None else film.number("iso", 100.0, ABOVE_0) / 100)
 
 
 @converts(
@@ -143,8 +143,7 @@ def _filter(entity: Entity) -> Settings:
         entity.lose(f"yradius; {radius:g} in its place")
     if entity.type == "gaussian":
         return {"filter": GaussianFilter(radius, entity.number("sigma", 0.5), windowed=True)}
-    name, kind = ("box", BoxFilter) if entity.type == "box" else ("tent", TentFilter)
-    return {"filter": name if radius == kind.radius else kind(radius)}
+    return {"filter": filter_setting("tent" if entity.type == "triangle" else entity.type, radius)}
 
 
 unsupported("filter", "mitchell sinc")
