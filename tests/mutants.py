@@ -41,6 +41,7 @@ from wavefront.core.parameter import Parameter
 ROOT = Path(__file__).resolve().parent.parent
 OURS = str(ROOT / "wavefront"), str(ROOT / "tests")
 # the tests that concern a file, quick ones first
+LAYERS = ("layers", "metallic", "metal", "gloss", "matte", "clear", "coat", "cloth", "film", "fresnel")
 TESTS: dict[str, tuple[str, ...]] = {
     "wavefront/stages/reuse.py": (
         "tests/integrators/test_shared_connections.py",
@@ -85,11 +86,18 @@ TESTS: dict[str, tuple[str, ...]] = {
             "tests/properties/test_density_of_bsdfs.py",
         ),
     ),
-    "wavefront/bsdfs/openpbr.py": (
-        "tests/bsdfs/test_openpbr.py",
-        "tests/bsdfs/test_bsdfs.py",
-        "tests/bsdfs/test_bsdf_models.py",
-        "tests/properties/test_density_of_bsdfs.py",
+    **dict.fromkeys(
+        (
+            "wavefront/bsdfs/openpbr.py",
+            *(f"wavefront/bsdfs/layers/{name}.py" for name in LAYERS),
+        ),
+        (
+            "tests/bsdfs/test_openpbr.py",
+            "tests/bsdfs/test_bsdf_formulas.py",
+            "tests/bsdfs/test_bsdfs.py",
+            "tests/bsdfs/test_bsdf_models.py",
+            "tests/properties/test_density_of_bsdfs.py",
+        ),
     ),
     **dict.fromkeys(
         ("wavefront/bsdfs/sheen.py", "wavefront/bsdfs/diffuse_transmission.py"),
@@ -100,7 +108,7 @@ TESTS: dict[str, tuple[str, ...]] = {
         "tests/properties/test_density_of_bsdfs.py",
     ),
     **dict.fromkeys(
-        ("wavefront/bsdfs/disney.py", "wavefront/bsdfs/disney_thin.py"),
+        ("wavefront/bsdfs/disney.py", "wavefront/bsdfs/disney_thin.py", "wavefront/bsdfs/layers/disney.py"),
         (
             "tests/bsdfs/test_disney.py",
             "tests/bsdfs/test_bsdfs.py",
@@ -144,6 +152,7 @@ DENSITIES = (
     "wavefront/bsdfs/disney.py",
     "wavefront/bsdfs/disney_thin.py",
     "wavefront/bsdfs/energy.py",
+    *(f"wavefront/bsdfs/layers/{name}.py" for name in (*LAYERS, "disney")),
     "wavefront/bsdfs/measured.py",
     "wavefront/bsdfs/microfacet.py",
     "wavefront/bsdfs/mirror.py",

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from test_bsdfs import surface
 
+import wavefront as wf
 from wavefront.bsdfs import OpenPBRBsdf, OrenNayar
 from wavefront.bsdfs.albedo import dielectric_albedo
 from wavefront.bsdfs.fresnel import fresnel_conductor, fresnel_dielectric
@@ -90,16 +91,16 @@ def test_a_white_base_reflects_all_light(ior, roughness):
 
 def test_anisotropy_keeps_the_mean_square_of_alpha():
     for r, a in ((0.3, 0.0), (0.5, 0.6), (0.8, 0.95)):
-        facets = OpenPBRBsdf(specular_roughness=r, specular_roughness_anisotropy=a)._layers.facets()
+        facets = OpenPBRBsdf(specular_roughness=r, specular_roughness_anisotropy=a).layers().base.facets()
         across = facets.alpha if facets.alpha_v is None else facets.alpha_v
         assert across / facets.alpha == pytest.approx(1 - a, rel=1e-5)
         assert (across**2 + facets.alpha**2) / 2 == pytest.approx(r**4, rel=1e-5)
 
 
 def test_a_rough_coat_makes_the_base_rougher():
-    layers = OpenPBRBsdf(specular_roughness=0.3, coat_roughness=0.4, coat_weight=0.5)._layers
-    assert layers.roughness == pytest.approx(0.5 * (0.3 + (0.3**4 + 2 * 0.4**4) ** 0.25), rel=1e-5)
-    most = OpenPBRBsdf(specular_roughness=0.3, coat_roughness=1.0, coat_weight=1.0)._layers
+    base = OpenPBRBsdf(specular_roughness=0.3, coat_roughness=0.4, coat_weight=0.5).layers().base
+    assert base.roughness == pytest.approx(0.5 * (0.3 + (0.3**4 + 2 * 0.4**4) ** 0.25), rel=1e-5)
+    most = OpenPBRBsdf(specular_roughness=0.3, coat_roughness=1.0, coat_weight=1.0).layers().base
     assert most.roughness == pytest.approx(1)
 
 
@@ -143,8 +144,8 @@ def test_the_thickness_of_a_film_is_in_micrometers():
     def film(z):
         return film_reflectance(F4(z), F4([400]), F4([1.4]), F4(1), F4([1.8]))
 
-    layers = OpenPBRBsdf(**given, base_color=0.5)._layers
-    assert layers._gloss(F4([0.7])) == pytest.approx(film([0.7]), rel=1e-3)
+    base = OpenPBRBsdf(**given, base_color=0.5).layers().base
+    assert base.gloss.reflectance(F4([0.7])) == pytest.approx(film([0.7]), rel=1e-3)
     wo, wi = pair(0.7, 0.4, 0.3)
     white, black = (OpenPBRBsdf(**given, base_color=color).f(wo, wi) for color in (1.0, 0.0))
     z = (np.arange(1000) + 0.5) / 1000
@@ -163,8 +164,8 @@ def test_a_metal_below_a_film_has_an_index(edge):
     cos = F4([0.2, 0.7, 1])
     assert fresnel_conductor(F4([1]), eta, k) == pytest.approx(f0, rel=1e-5)
     film = film_reflectance(cos, F4([350]), F4([1.4]), F4(1), eta.astype(F4), k.astype(F4))
-    layers = OpenPBRBsdf(**metal, thin_film_thickness=0.35)._layers
-    assert layers._metal(cos) == pytest.approx(film, rel=1e-3)
+    base = OpenPBRBsdf(**metal, thin_film_thickness=0.35).layers().base
+    assert base.metal.reflectance(cos) == pytest.approx(film, rel=1e-3)
 
 
 @pytest.mark.parametrize(("metal", "clear"), [(0.0, 0.0), (0.3, 0.4), (1.0, 0.0)])
@@ -207,9 +208,9 @@ def test_a_coat_reflects_by_its_index(ior: float):
 
 def test_the_gloss_below_a_coat_is_relative_to_its_index():
     for ior, other in ((1.6 * 1.3, 1.3), (1.6 / 1.3, 1.3)):  # a denser coat reflects nothing totally
-        layers = OpenPBRBsdf(specular_ior=ior, coat_weight=1.0)._layers
+        base = OpenPBRBsdf(specular_ior=ior, coat_weight=1.0).layers().base
         expected = fresnel_dielectric(F4([0.7]), F4([other]))[0]
-        assert layers._gloss(F4([0.7]))[0] == pytest.approx(expected, rel=1e-4)
+        assert base.gloss.reflectance(F4([0.7]))[0] == pytest.approx(expected, rel=1e-4)
 
 
 def test_fuzz_lies_above_all():
@@ -309,3 +310,20 @@ def test_parameters_out_of_range_are_refused(name: str, allowed: float, refused:
 def test_unknown_parameters_are_refused():
     with pytest.raises(TypeError, match="coat_wight"):
         OpenPBRBsdf(coat_wight=1)
+
+
+def test_a_film_lies_on_what_varies():
+    """The index below it is one for each point, by a texture or by what is around."""
+    shades = wf.Texture(np.linspace(0.2, 1, 64).reshape(8, 8))
+    sphere = wf.Sphere((0, 0, 0), 1, material=wf.OpenPBR(specular_weight=shades, thin_film_weight=1.0))
+    image = wf.render([sphere, wf.Environment(1)], spp=1, size=(12, 12), progress=False)
+    assert np.isfinite(image.rgb).all()
+    plain = wf.OpenPBR(specular_weight=0.6, thin_film_weight=1.0)
+    constant = wf.Texture(np.full((2, 2), 0.6))
+    one, two = (
+        wf.render(
+            [wf.Sphere((0, 0, 0), 1, material=each), wf.Environment(1)], spp=2, size=(12, 12), progress=False
+        )
+        for each in (plain, wf.OpenPBR(specular_weight=constant, thin_film_weight=1.0))
+    )
+    np.testing.assert_allclose(one.rgb, two.rgb, rtol=2e-3)

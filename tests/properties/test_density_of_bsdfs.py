@@ -35,6 +35,8 @@ from wavefront.bsdfs import (
     ThinDisney,
 )
 from wavefront.bsdfs.fuzz import _transformation
+from wavefront.bsdfs.layers.coat import Varnish
+from wavefront.bsdfs.layers.layers import LayeredBsdf
 from wavefront.bsdfs.measured import UP, _coordinates, _elevation, _turned
 from wavefront.bsdfs.microfacet import Facets, alpha_of
 from wavefront.bsdfs.rough import Microfacets
@@ -175,13 +177,13 @@ def facets_of(bsdf: Bsdf) -> list[Facets]:
     """The facets of all lobes of a bound BSDF."""
     if isinstance(bsdf, Mix):
         return [*facets_of(bsdf.first), *facets_of(bsdf.second)]
-    if isinstance(bsdf, OpenPBRBsdf):
-        return facets_of(bsdf._layers)[: 1 + bsdf._layers._coated]
-    found = [bsdf.facets()] if isinstance(bsdf, Microfacets) else []
-    if isinstance(bsdf, ThinDisney):
-        found.append(bsdf.facets_through())
-    coated = isinstance(bsdf, Principled)
-    return [*found, Facets(alpha_of(bsdf.clearcoat_roughness))] if coated else found
+    if isinstance(bsdf, LayeredBsdf):
+        layers = bsdf.layers()
+        found = [layers.base.facets()]
+        found += [layers.base._facets_through()] if isinstance(bsdf, ThinDisney) else []
+        varnish = [Facets(alpha_of(cover.roughness)) for cover in layers.covers if isinstance(cover, Varnish)]
+        return [*found, *varnish]
+    return [bsdf.facets()] if isinstance(bsdf, Microfacets) else []
 
 
 def indices_of(bsdf: Bsdf, inside: bool) -> list[float]:

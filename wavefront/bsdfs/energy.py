@@ -28,7 +28,7 @@ from .microfacet import Facets, alpha_of, reflect, refract
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from .rough import Microfacets
+    from .rough import MicrofacetSurface
 
 COLUMNS = 32  # of a table, by the angle to the normal
 FINE = 1024  # of a table of one row, in the end
@@ -88,14 +88,16 @@ class Loss(NamedTuple):
     passed: float  # mean transmittance of a smooth boundary
     ior: float
 
-    def at(self, bsdf: Microfacets, w: Floats, inside: Bools, stretched: Floats | None = None) -> Floats:
+    def at(
+        self, bsdf: MicrofacetSurface, w: Floats, inside: Bools, stretched: Floats | None = None
+    ) -> Floats:
         """Return L of directions w (3, n) on the inside or not, and of a σ, if it is known, (n,)."""
         place = _place_of_refraction(bsdf.facets(), w, stretched)
         return _directional(bsdf, self.lost, place, inside)
 
     def lobe(
         self,
-        bsdf: Microfacets,
+        bsdf: MicrofacetSurface,
         wo: Floats,
         wi: Floats,
         inside: Bools,
@@ -109,7 +111,7 @@ class Loss(NamedTuple):
         value = chance * self.at(bsdf, wi, inside != below, stretched[1]) * scale
         return value, bsdf.facets().wide_pdf(wi, stretched[1]) * part, chance
 
-    def directions(self, bsdf: Microfacets, u: Floats, inside: Bools, lanes: Ints) -> Floats:
+    def directions(self, bsdf: MicrofacetSurface, u: Floats, inside: Bools, lanes: Ints) -> Floats:
         """Return directions of the lobe (3, k) on some lanes, for u (3, n) and wo inside or not."""
         crossing = np.broadcast_to(self._sides(bsdf, inside, True)[0], u[2].shape).take(lanes)
         u = u.take(lanes, 1)
@@ -119,7 +121,7 @@ class Loss(NamedTuple):
         wi[2] *= np.where(f4(2) * u[2] - second < crossing, f4(-1), f4(1))
         return wi
 
-    def _sides(self, bsdf: Microfacets, inside: Bools, below: Bools | bool) -> tuple[Floats, Floats]:
+    def _sides(self, bsdf: MicrofacetSurface, inside: Bools, below: Bools | bool) -> tuple[Floats, Floats]:
         """Return the part of the lobe on a side of the boundary, and what products of L are scaled by."""
         out, in_ = (_of_roughness(bsdf, self.means, side) for side in (0, 1))
         least, squared = f4(self.passed) * np.minimum(out, in_), f4(self.ior * self.ior)
@@ -144,7 +146,7 @@ def mean_over_cosines(reflectance: Callable[[Floats], Floats]) -> Floats:
 
 
 def gain(
-    bsdf: Microfacets,
+    bsdf: MicrofacetSurface,
     wo: Floats,
     wi: Floats,
     mean_reflectance: Floats | None = None,
@@ -162,7 +164,7 @@ def gain(
     return f4(1) + (one * other - f4(1)) * part_kept(bsdf, mean_reflectance)
 
 
-def part_kept(bsdf: Microfacets, mean_reflectance: Floats) -> Floats:
+def part_kept(bsdf: MicrofacetSurface, mean_reflectance: Floats) -> Floats:
     """Return the part that a metal keeps of what it scatters more than once, beside the first F, (3, n).
 
     It is F·M/(1 − F·(1 − M)), with M the mean albedo of single scattering (Kulla and Conty).
@@ -188,7 +190,7 @@ def _column_of_refraction(z: Any, stretched: Any) -> Any:
     return z * (z * f4(0.4) + f4(0.4)) + np.sqrt(z / stretched) * f4(0.2)
 
 
-def _directional(bsdf: Microfacets, table: Floats, place: Place, side: Bools | int = 0) -> Floats:
+def _directional(bsdf: MicrofacetSurface, table: Floats, place: Place, side: Bools | int = 0) -> Floats:
     """Return what a table (sides, …) has for directions at a place, (n,)."""
     turn, column = place
     if table.shape[-1] == FINE:
@@ -197,7 +199,7 @@ def _directional(bsdf: Microfacets, table: Floats, place: Place, side: Bools | i
     return interpolate(table, (bsdf.roughness, bsdf.roughness_v, turn, column), side)
 
 
-def _of_roughness(bsdf: Microfacets, table: Floats, side: Bools | int = 0) -> Floats:
+def _of_roughness(bsdf: MicrofacetSurface, table: Floats, side: Bools | int = 0) -> Floats:
     """Return what a table (sides, r, r) has for the roughnesses of a BSDF, (n,) or (1,)."""
     return interpolate(table, (bsdf.roughness, bsdf.roughness_v), np.atleast_1d(side))
 

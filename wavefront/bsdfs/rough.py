@@ -54,35 +54,15 @@ class Tangent(BaseTexture):
         return np.stack([x * cos - y * sin, y * cos + x * sin])
 
 
-class Microfacets(JointBsdf):
-    """A BSDF whose surface consists of microfacets; a subclass declares which of these are parameters."""
+class MicrofacetSurface:
+    """What consists of microfacets."""
 
     roughness: Any
     roughness_v: Any = None
-    rotation: Any = np.zeros(1, f4)
     distribution: Any = "ggx"
     shadowing: Any = "correlated"
-    multiscatter: Any = False
     tangent: Any = None
-
-    def derive(self) -> None:
-        """Set `specular` from the roughness, and what tells its direction."""
-        across = self.roughness if self.roughness_v is None else self.roughness_v
-        self.specular = is_smooth(self.roughness) and is_smooth(across)
-        self._set_shape()
-
-    def _set_shape(self) -> None:
-        """Set the tangent, and what tables of lost light depend on."""
-        self.tangent = None if self.roughness_v is None else Tangent(self.rotation)
-        known = [
-            None
-            if r is None or isinstance(r, BaseTexture) or not self.multiscatter
-            else float(alpha_of(r)[0])
-            for r in (self.roughness, self.roughness_v)
-        ]
-        beckmann, separable = self.distribution == "beckmann", self.shadowing == "separable"
-        brushed = self.multiscatter and self.roughness_v is not None
-        self.shape = Shape(known[0], known[1], beckmann, separable, brushed)
+    shape: Shape  # of tables of lost light
 
     def roughness_toward(self, w: Floats) -> Floats:
         """Return the roughness that masks directions w (3, n) as this surface does, (n,) or (1,)."""
@@ -105,6 +85,32 @@ class Microfacets(JointBsdf):
         tangent = None if isinstance(self.tangent, BaseTexture) else self.tangent
         beckmann, separable = self.distribution == "beckmann", self.shadowing == "separable"
         return Facets(alpha_of(self.roughness), across, tangent, beckmann, separable)
+
+
+class Microfacets(MicrofacetSurface, JointBsdf):
+    """A BSDF whose surface consists of microfacets; a subclass declares which of these are parameters."""
+
+    rotation: Any = np.zeros(1, f4)
+    multiscatter: Any = False
+
+    def derive(self) -> None:
+        """Set `specular` from the roughness, and what tells its direction."""
+        across = self.roughness if self.roughness_v is None else self.roughness_v
+        self.specular = is_smooth(self.roughness) and is_smooth(across)
+        self._set_shape()
+
+    def _set_shape(self) -> None:
+        """Set the tangent, and what tables of lost light depend on."""
+        self.tangent = None if self.roughness_v is None else Tangent(self.rotation)
+        known = [
+            None
+            if r is None or isinstance(r, BaseTexture) or not self.multiscatter
+            else float(alpha_of(r)[0])
+            for r in (self.roughness, self.roughness_v)
+        ]
+        beckmann, separable = self.distribution == "beckmann", self.shadowing == "separable"
+        brushed = self.multiscatter and self.roughness_v is not None
+        self.shape = Shape(known[0], known[1], beckmann, separable, brushed)
 
 
 @parametrized
