@@ -41,6 +41,7 @@ def load(
     smooth: bool | float | str = AUTO,
     parameters: Mapping[str, Any] | None = None,
     time: float | None = None,
+    animation: str | int | bool | None = None,
 ) -> Scene:
     """Read a scene: obj (with its mtl), ply, stl, glb, gltf, off, dae, 3mf, xml of Mitsuba 3, pbrt, or usd.
 
@@ -67,12 +68,17 @@ def load(
     parameters
         Values of the parameters `$name` of an .xml file, in place of their defaults.
     time
-        Time code of a stage of USD; by default the first one.
+        Seconds: the scene of this time, in which nothing moves. By default a file that moves gives a scene
+        that does, and is that of its start (`Scene.at`).
+    animation
+        Of glTF: the name or number of what moves it, one of `Scene.animations`. By default the first one;
+        False leaves everything at rest.
 
     Raises
     ------
     SceneError
-        If the file cannot be read. The message names the file, the line or element, the value and the limit.
+        If the file cannot be read, or has no such animation. The message names the file, the line or element,
+        the value and the limit.
 
     Examples
     --------
@@ -90,8 +96,10 @@ def load(
             smooth=check_smooth("smooth", smooth),
             parameters=dict(parameters or {}),
             time=None if time is None else number("time", time),
+            animation=animation,
         )
         scene = read(path, options).scene(path_name(path), losses)
+        scene = scene if time is None else scene.at(options.time or 0.0)
         if not os.fspath(path).lower().endswith(ALL_OF_THE_LIGHT):
             scene.lights_of_file = [id(each) for each in scene.lights]
         return scene

@@ -37,7 +37,8 @@ class LoadOptions:
     search_paths: tuple[Path, ...] = ()  # folders whose files the file may refer to, beside its own
     smooth: bool | float | str = AUTO  # normals, as for `load`
     parameters: Mapping[str, Any] = field(default_factory=dict)  # of the scene file, by name
-    time: float | None = None  # the time code of a stage of USD; None for its first
+    time: float | None = None  # seconds, for readers that read one time; None for the first
+    animation: str | int | bool | None = None  # name or number; None for the first, False for none
 
 
 def read(path: PathLike, options: LoadOptions) -> Contents:
@@ -58,6 +59,8 @@ def read(path: PathLike, options: LoadOptions) -> Contents:
     if kind in PLAIN:
         _refuse(name, data)
     contents = parse(files, data, options)
+    if not (options.animation is None or options.animation is False or contents.animations):
+        raise SceneError(f"{name}: animation is {options.animation!r}; the file has none")
     contents.smooth(options.smooth)
     options.limits.check_meshes(name, len(contents.raws))
     options.limits.check_triangles(name, sum(len(raw.faces) for raw in contents.raws))
@@ -75,7 +78,7 @@ def _refuse(name: str, data: bytes) -> None:
 def _read_gltf(files: SceneFiles, data: bytes, options: LoadOptions) -> Contents:
     document = gltf.Document(files, data)
     with document.inside("the file"):
-        contents, numbers = gltf.contents(document)
+        contents, numbers = gltf.contents(document, options.animation)
         specs = GltfMaterials(document)
         for raw, number in zip(contents.raws, numbers, strict=True):
             if options.materials and not assign_material(raw, specs.spec(number)):

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from abc import abstractmethod
+from contextlib import nullcontext
 from dataclasses import dataclass, field, replace
 from typing import Any
 
@@ -9,9 +11,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..arrays.vec import FLOAT32_MAX, Bools, Doubles, Ints, cross, spans
-from ..core.errors import printable
+from ..core.errors import collect_warnings, printable
 from ..core.plural import plural
 from ..materials import Material
+from ..motion import Deformation
 from ..shapes import Mesh
 from ..textures.parameter import Color
 from .losses import Losses
@@ -48,6 +51,15 @@ class RawMesh:
     two_sided: bool = False  # the emission leaves both sides
     smooth: bool | float | str = False  # as of `Mesh`, where there are no normals
     attributes: dict[str, Table] = field(default_factory=dict)  # (n or m, k) of scenes of Mitsuba, by name
+    deformation: FormOverTime | None = None  # of a mesh that deforms: the arrays are those of its start
+
+
+class FormOverTime(Deformation):
+    """How a mesh of a file deforms."""
+
+    @abstractmethod
+    def keeping(self, faces: Bools) -> Deformation:
+        """Return the deformation of a mesh that has only some of the faces, by a mask (m,)."""
 
 
 def with_corner_uvs(raw: RawMesh, corners: Any) -> RawMesh:
@@ -114,11 +126,23 @@ def build(source: str, raw: RawMesh, losses: Losses) -> Mesh | None:
     vertices = np.where(sound[:, None], vertices, 0.0)
     keep: Bools = there & np.all(sound[faces], axis=1)
     _note_faces(losses, label, raw, there & ~keep, "with a vertex that is not finite or beyond float32")
-    flat = keep & ~_has_area(vertices, faces)
+    flat = keep & ~_has_area(vertices, faces) & (raw.deformation is None)  # others may be flat at times
     _note_faces(losses, label, raw, flat, "of zero area")
     faces = faces[keep & ~flat]
     if not len(faces):
         return None
+    # of a mesh that deforms other forms may be sound, and are taken as they are
+    with nullcontext() if raw.deformation is None else collect_warnings():
+        mesh = _mesh(losses, label, raw, vertices, faces)
+    if raw.deformation is not None:
+        mesh.deformation = raw.deformation.keeping(keep)
+        if raw.normals is None and raw.smooth is not False:
+            mesh.compute_normals(raw.smooth)
+    return mesh
+
+
+def _mesh(losses: Losses, label: str, raw: RawMesh, vertices: Table, faces: Faces) -> Mesh:
+    """Return a mesh of sound vertices and faces, with what it has beside them."""
     return Mesh(
         vertices,
         faces,
@@ -131,7 +155,7 @@ def build(source: str, raw: RawMesh, losses: Losses) -> Mesh | None:
         emission=raw.emission,
         two_sided=raw.two_sided,
         name=printable(raw.name) or "mesh",
-        smooth=False if raw.normals is not None else raw.smooth,
+        smooth=False if raw.normals is not None or raw.deformation is not None else raw.smooth,
     )
 
 

@@ -20,10 +20,10 @@ class Together:
     Parameters
     ----------
     motions
-        n of them.
+        n of them; or matrices (4, 4), which stay.
     """
 
-    def __init__(self, motions: Sequence[Motion]) -> None:
+    def __init__(self, motions: Sequence[Motion | Doubles]) -> None:
         self._rows: dict[int, int] = {}  # row of each distinct motion or matrix, by its id
         self._parts: list[Motion | Doubles] = []  # and each of them, parents and children before products
         self._pairs: list[tuple[int, int, int]] = []  # rows of a product, its parent and its child

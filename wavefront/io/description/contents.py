@@ -19,16 +19,17 @@ from .placing import Places, place_shapes
 
 @dataclass
 class Contents:
-    """The content of a file at one time, with lengths and axes of the scene."""
+    """The content of a file, with lengths and axes of the scene."""
 
     raws: list[RawMesh] = field(default_factory=list)  # each once, with its material and its light
-    places: Places = field(default_factory=Places)  # of these; samples of more times belong beside it
+    places: Places = field(default_factory=Places)  # of these
     lights: Sequence[Light] = ()
     camera: Camera | None = None
     shapes: Sequence[Shape] = ()  # further ones, built already
     up: str | None = None  # the axis that is up by the format or the file; None where neither says
     settings: Mapping[str, Any] = field(default_factory=dict)  # as of `Scene`
     medium: BaseMedium | None = None  # around the shapes
+    animations: tuple[str, ...] = ()  # names of those of the file, of which one is read
     flat: bool = False  # whether meshes without normals have flat facets by the format
 
     @classmethod
@@ -49,7 +50,7 @@ class Contents:
             raise losses.nothing("has no faces")
         seen = {"up": self.up, "settings": self.settings, "medium": self.medium}
         scene = Scene(shapes, self.lights, self.camera, **seen)  # type: ignore[arg-type]
-        scene.losses = losses.found
+        scene.losses, scene.animations = losses.found, self.animations
         return scene
 
     def smooth(self, smooth: bool | float | str) -> None:

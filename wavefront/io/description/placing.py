@@ -10,6 +10,7 @@ import numpy as np
 from ...arrays.vec import Bools, Ints, cross, dot, spans
 from ...core.errors import LimitError, SceneError
 from ...materials import Material
+from ...motion import Motion
 from ...shapes import Instance, Mesh
 from ...shapes.instance import can_place
 from ...shapes.transform import Matrix, moved, moved_tangents
@@ -17,6 +18,7 @@ from ..losses import Losses
 from ..repair import AT_ONCE, RawMesh, build
 
 MAX_ELEMENT = 1e100  # of a matrix: the squares of larger elements overflow
+ALMOST_FLAT = 1e-9  # determinant, relative to the largest element, of matrices that are no instances
 MAX_COPIES = 2**14  # meshes that cannot be instances, because their matrices are singular
 MAX_COPIED_FACES = 2**25  # triangles in copies of meshes, where each placement becomes a mesh
 
@@ -30,6 +32,7 @@ class Places:
     # (n,) of the placed shapes, "" for that of the mesh; None for all of these
     names: list[str] | None = None
     materials: list[Material | None] | None = None  # the same, in place of those of the meshes
+    motions: list[Motion | None] | None = None  # the same, of what moves: the matrices are those of the start
 
     @classmethod
     def once(cls, count: int) -> Places:
@@ -75,18 +78,26 @@ def place_shapes(name: str, raws: list[RawMesh], places: Places, losses: Losses)
     _check_range(name, raws, places)
     shapes: list[Mesh | Instance | None] = [None] * len(places.raw)
     copies = 0
+    motions: list[Motion | None] = places.motions or [None] * len(places.raw)
     for raw, at in _by_mesh(raws, places):
         matrices = places.matrix[at]
-        if len(at) == 1:
+        if len(at) == 1 and motions[at[0]] is None and raw.deformation is None:
             shapes[at[0]] = build(name, moved_raw(raw, matrices[0]), losses)
             continue
         mesh = build(name, raw, losses)
         if mesh is None:
             continue
+        if len(at) == 1 and motions[at[0]] is None:
+            shapes[at[0]] = mesh.transformed(matrices[0])
+            continue
+        moving = np.array([motions[i] is not None for i in at.tolist()])
+        matrices[moving] = invertible(matrices[moving])
         fit = can_place(mesh, matrices)
         instances = Instance.many(mesh, matrices[fit])
         for i, instance in zip(at[fit].tolist(), instances, strict=True):
             shapes[i] = instance
+            if motions[i] is not None:
+                instance.motion = motions[i]
         copies += len(at) - len(instances)
         if copies > MAX_COPIES:
             raise LimitError(
@@ -102,6 +113,15 @@ def place_shapes(name: str, raws: list[RawMesh], places: Places, losses: Losses)
         if shape is not None and made_of is not None:
             shape.material = made_of
     return [shape for shape in shapes if shape is not None]
+
+
+def invertible(matrices: Matrix) -> Matrix:
+    """Return matrices (n, 4, 4) of the starts of motions; those that flatten then scale by almost 0."""
+    linear = matrices[:, :3, :3]
+    flat = np.abs(np.linalg.det(linear)) <= ALMOST_FLAT * np.abs(linear).max((1, 2)) ** 3
+    out = matrices.copy()
+    out[flat, :3, :3] = ALMOST_FLAT * np.eye(3)
+    return out
 
 
 def place_meshes(name: str, raws: list[RawMesh], places: Places, losses: Losses) -> list[Mesh]:

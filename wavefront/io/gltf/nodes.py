@@ -12,10 +12,13 @@ import numpy as np
 
 from ...arrays.vec import Ints
 from ...core.errors import SceneError
+from ...motion import Motion, Product, Together
+from ...motion.keyframes import composed
 from ...shapes.transform import IDENTITY, Matrix
 from ..description.numbers import is_row, shown, table
 from ..description.placing import MAX_ELEMENT, in_range
 from ..repair import wide
+from .animations import Clip
 from .document import Document
 from .meshes import attribute
 
@@ -34,8 +37,9 @@ class Node:
 
     index: int  # in the file
     json: dict[str, Any]
-    matrix: Matrix  # (4, 4) to the scene
+    matrix: Matrix  # (4, 4) to the scene, at the start of the animation
     shown: bool  # whether the scene has it; others may be joints
+    motion: Motion | None = None  # to the scene
 
     @property
     def label(self) -> str:
@@ -43,13 +47,13 @@ class Node:
         return f"node {self.json.get('name', '?')!r}"
 
 
-def walk(document: Document) -> list[Node]:
-    """Return every node of the default scene, and of all where there are skins.
+def walk(document: Document, clip: Clip) -> list[Node]:
+    """Return every node of the default scene, and of all where there are skins, as a clip moves them.
 
     The last of a node's children comes first. Nodes that are missing or malformed, that are reached twice, or
     whose matrices are beyond the supported range are left out, which is noted.
     """
-    way = _Walk(document)
+    way = _Walk(document, clip)
     way.follow(_roots(document))
     count = len(way.indices)
     if document.items("skins"):
@@ -60,8 +64,8 @@ def walk(document: Document) -> list[Node]:
 class _Walk:
     """The nodes that are met on the way from roots to their children."""
 
-    def __init__(self, document: Document) -> None:
-        self._document = document
+    def __init__(self, document: Document, clip: Clip) -> None:
+        self._document, self._clip = document, clip
         self.seen: set[int] = set()
         self.indices: list[int] = []
         self._found: list[dict[str, Any]] = []
@@ -93,14 +97,36 @@ class _Walk:
         """Return the nodes, of which the first `count` are shown."""
         local = _local(self._document, self.indices, self._found)
         matrices = _to_scene(local, np.array(self._parents, np.intp), np.array(self._depths, np.intp))
+        motions = self._motions(local)
+        if motions:
+            start = min(motion.start for motion in motions.values())
+            matrices[list(motions)] = Together(list(motions.values())).at(start)
         kept = in_range(matrices)
         for at in np.flatnonzero(~kept).tolist():
             place = f"nodes[{self.indices[at]}]"
             self._document.files.losses.note(f"its matrix to the scene {TOO_LARGE}", place, done="left out")
         return [
-            Node(self.indices[at], self._found[at], matrices[at], shown=at < count)
+            Node(self.indices[at], self._found[at], matrices[at], at < count, motions.get(at))
             for at in np.flatnonzero(kept).tolist()
         ]
+
+    def _motions(self, local: Matrix) -> dict[int, Motion]:
+        """Return the motions to the scene of the nodes that move by themselves or by a node above them."""
+        motions: dict[int, Motion] = {}
+        fixed: dict[int, Matrix] = {}  # to the scene, of others above those that move
+        for at, (index, parent) in enumerate(zip(self.indices, self._parents, strict=True)):
+            own: Motion | None = None
+            with self._document.part(f"nodes[{index}]", "at rest"):
+                own = self._clip.motion(index, self._found[at])
+            above = motions.get(parent)
+            if own is None and above is None:
+                if self._clip.nodes:
+                    fixed[at] = local[at] if parent < 0 else fixed[parent] @ local[at]
+                continue
+            around = above if above is not None else fixed.get(parent)
+            inner = own if own is not None else local[at]
+            motions[at] = inner if around is None else Product(around, inner)
+        return motions
 
 
 def _roots(document: Document) -> list[Any]:
@@ -166,7 +192,7 @@ def _local(document: Document, indices: list[int], nodes: list[dict[str, Any]]) 
         out[i, 3] = IDENTITY[3]
     at = np.flatnonzero(~given)
     parts = (rows(name.lower(), neutral, len(neutral), at) for name, neutral in INSTANCE_ATTRIBUTES.items())
-    out[at] = _composed(*parts)
+    out[at] = composed(*parts)
     return out
 
 
@@ -186,10 +212,10 @@ def count_placements(document: Document, node: Node) -> int:
 
 
 def placements(document: Document, node: Node, count: int) -> Matrix:
-    """Return the matrices (count, 4, 4) of a node's instances to the scene."""
+    """Return the matrices (count, 4, 4) of a node's instances to the node."""
     attributes = _instancing(node)
     if not attributes:
-        return node.matrix[None]
+        return IDENTITY[None]
     where = _place(document, node)
     for name in attributes.keys() - INSTANCE_ATTRIBUTES.keys():
         document.lose(f"{name} of instances", node.label)
@@ -202,8 +228,8 @@ def placements(document: Document, node: Node, count: int) -> Matrix:
             value = parts[-1][bad[0]].tolist()
             raise SceneError(f"{where} has {name}[{bad[0]}] {value}; it must be finite")
     with np.errstate(over="ignore", invalid="ignore"):
-        matrices = node.matrix @ _composed(*parts)
-    bad = np.flatnonzero(~in_range(matrices))
+        matrices = composed(*parts)
+        bad = np.flatnonzero(~in_range(node.matrix @ matrices))
     if bad.size:
         raise SceneError(f"{where}: the matrix of instance {bad[0]} to the scene {TOO_LARGE}")
     return matrices
@@ -217,26 +243,3 @@ def _instancing(node: Node) -> dict[str, Any]:
 
 def _place(document: Document, node: Node) -> str:
     return f"{document.name}: {INSTANCING} of {node.label}"
-
-
-def _composed(translation: Matrix, rotation: Matrix, scale: Matrix) -> Matrix:
-    """Return translation (n, 3) · rotation (n, 4) · scale (n, 3) as matrices (n, 4, 4)."""
-    matrix = np.zeros((len(translation), 4, 4))
-    with np.errstate(over="ignore", invalid="ignore"):
-        matrix[:, :3, :3] = _rotation(rotation) * scale[:, None]
-    matrix[:, :3, 3] = translation
-    matrix[:, 3, 3] = 1
-    return matrix
-
-
-def _rotation(quaternion: Matrix) -> Matrix:
-    """Return the matrices (n, 3, 3) of quaternions x, y, z, w (n, 4) of any length; 0 means no rotation."""
-    with np.errstate(over="ignore", divide="ignore"):
-        size = (quaternion[:, None] @ quaternion[:, :, None])[:, 0, 0]
-        factor = np.where(size > 0, np.sqrt(2 / size), 0)
-    x, y, z, w = (quaternion * factor[:, None]).T
-    out = np.empty((len(quaternion), 3, 3))
-    out[:, 0] = np.stack([1 - y * y - z * z, x * y - z * w, x * z + y * w], 1)
-    out[:, 1] = np.stack([x * y + z * w, 1 - x * x - z * z, y * z - x * w], 1)
-    out[:, 2] = np.stack([x * z - y * w, y * z + x * w, 1 - x * x - y * y], 1)
-    return out

@@ -5,19 +5,22 @@ Source: Khronos Group, glTF 2.0 specification, chapters 3.7.2.2 (morph targets) 
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
+from copy import copy
 from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
 
-from ...arrays.vec import Doubles, Ints
+from ...arrays.vec import FLOAT32_MAX, Bools, Doubles, Ints
 from ...core.plural import plural
+from ...motion import Motion, Together
+from ...motion.track import Track
 from ...shapes.transform import Matrix
 from ..description.numbers import floats
 from ..description.placing import MAX_ELEMENT
 from ..losses import Losses
-from ..repair import RawMesh, Table
+from ..repair import FormOverTime, RawMesh, Table
 from .document import Document
 
 MORPHED = {"POSITION": "vertices", "NORMAL": "normals", "TANGENT": "tangents"}  # attributes with targets
@@ -65,6 +68,83 @@ def pose(
             return raw
         joints = np.array([matrices[node] for node in skin.nodes]).reshape(-1, 4, 4) @ skin.inverse
         return _skinned(raw, bend.joints, bend.weights, joints)
+
+
+class Joints:
+    """The joints of a skin over time.
+
+    Parameters
+    ----------
+    nodes
+        Their numbers in the file.
+    places
+        Of each the motion to the scene, or the matrix (4, 4) of one that stays.
+    """
+
+    def __init__(self, nodes: list[int], places: Sequence[Motion | Matrix]) -> None:
+        self._nodes, self._together = nodes, Together(places)
+        moving = [place for place in places if isinstance(place, Motion)]
+        self.move = bool(moving)
+        self.start = min((motion.start for motion in moving), default=np.inf)
+        self.end = max((motion.end for motion in moving), default=-np.inf)
+        self._last: tuple[float, dict[int, Matrix]] = np.nan, {}  # as several meshes may have one skin
+
+    def at(self, time: float) -> Mapping[int, Matrix]:
+        """Return the matrices (4, 4) to the scene at a time, by the numbers of the nodes."""
+        if self._last[0] != time:
+            self._last = time, dict(zip(self._nodes, self._together.at(time), strict=True))
+        return self._last[1]
+
+
+class PosedMesh(FormOverTime):
+    """The mesh of a primitive in the poses of an animation.
+
+    Parameters
+    ----------
+    raw, bend, skin
+        As for `pose`.
+    weights
+        Of its morph targets, over time or (t,) that stay.
+    joints
+        Of its skin.
+    """
+
+    def __init__(
+        self,
+        raw: RawMesh,
+        bend: Bend,
+        weights: Track | Doubles,
+        skin: Skin | None,
+        joints: Joints | None,
+    ) -> None:
+        self._raw, self._bend, self._weights, self._skin, self._joints = raw, bend, weights, skin, joints
+        self._kept: Bools | None = None  # faces of the mesh that was built
+        spans = [(each.start, each.end) for each in (weights,) if isinstance(each, Track)]
+        spans += [(joints.start, joints.end)] if joints is not None and joints.move else []
+        self.start, self.end = min(span[0] for span in spans), max(span[1] for span in spans)
+
+    def posed(self, time: float) -> RawMesh:
+        """Return the mesh in the pose of a time."""
+        weights = self._weights.at(time) if isinstance(self._weights, Track) else self._weights
+        joints = {} if self._joints is None else self._joints.at(time)
+        return pose(self._raw, self._bend, weights[: len(self._bend.targets)], self._skin, joints)
+
+    def keeping(self, faces: Bools) -> PosedMesh:
+        """Return the deformation of a mesh that has only some of the faces, by a mask (m,)."""
+        deformation = copy(self)
+        deformation._kept = faces
+        return deformation
+
+    def at(self, time: float) -> Mapping[str, Any]:
+        """Return vertices, faces, and normals and tangents if there are any, at a time."""
+        posed = self.posed(time)
+        vertices = posed.vertices
+        sound = np.asarray((np.abs(vertices) <= FLOAT32_MAX).all(1))  # false for NaN
+        if not sound.all():
+            vertices = np.where(sound[:, None], vertices, 0.0)
+        faces = posed.faces if self._kept is None else posed.faces[self._kept]
+        found = {"normals": posed.normals, "tangents": posed.tangents if posed.normals is not None else None}
+        return {"vertices": vertices, "faces": faces, **{k: v for k, v in found.items() if v is not None}}
 
 
 def held(losses: Losses, place: str, bend: Bend, skin: Skin) -> Bend:

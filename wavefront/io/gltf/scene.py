@@ -6,12 +6,15 @@ from the JSON itself, so numbers are exact, and every index is checked.
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
 from ...camera import Camera
 from ...core.errors import LimitError, SceneError, exact, printable
+from ...motion import Motion, Product
+from ...motion.track import Track
 from ...shapes.transform import IDENTITY, Matrix
 from ..description.contents import Contents
 from ..description.numbers import floats, shown
@@ -19,24 +22,34 @@ from ..description.placing import Places
 from ..description.punctual import punctual_light
 from ..description.views import camera_at, pose_of
 from ..repair import RawMesh
+from .animations import names, read_clip
 from .document import OF_CANDELA, Document
 from .meshes import Primitive, primitives
 from .nodes import INSTANCING, Node, count_placements, placements, walk
-from .posing import Skin, held, pose, read_skin, target_weights
+from .posing import Joints, PosedMesh, Skin, held, pose, read_skin, target_weights
 
 HEIGHT = 512  # pixels of a camera's picture; files give only its aspect ratio
 
 
-def contents(document: Document) -> tuple[Contents, list[Any]]:
+def contents(document: Document, animation: str | int | bool | None) -> tuple[Contents, list[Any]]:
     """Return what the default scene holds, and the number of each mesh's material; None for none.
+
+    Parameters
+    ----------
+    document
+        The file.
+    animation
+        Name or number of what moves it, as of `load`.
 
     Raises
     ------
     SceneError
-        If an element is missing or malformed, or the nodes place more meshes than its limits allow.
+        If an element is missing or malformed, there is no such animation, or the nodes place more meshes than
+        its limits allow.
     """
-    out, nodes = Contents(flat=True), walk(document)
-    meshes = _Meshes(document, {node.index: node.matrix for node in nodes})
+    clip = read_clip(document, animation)
+    out, nodes = Contents(flat=True, animations=names(document)), walk(document, clip)
+    meshes = _Meshes(document, {node.index: node for node in nodes}, clip.weights)
     for node in nodes:
         if not node.shown:
             continue
@@ -47,8 +60,6 @@ def contents(document: Document) -> tuple[Contents, list[Any]]:
             _add_others(document, out, node)
     if len(document.items("scenes")) > 1:
         document.lose("further scenes", "the file")
-    if document.json.get("animations"):
-        document.files.losses.note("animations", done="left out; what they move is at rest")
     out.raws, out.places = [raw for raw, _ in meshes.raws], meshes.places()
     return out, [number for _, number in meshes.raws]
 
@@ -60,19 +71,24 @@ class _Meshes:
     ----------
     document
         The file.
-    matrices
-        (4, 4) to the scene of each node, by its number in the file.
+    nodes
+        By their numbers in the file.
+    weights
+        Of morph targets over time, by the numbers of nodes.
     """
 
-    def __init__(self, document: Document, matrices: dict[int, Matrix]) -> None:
-        self._document, self._matrices = document, matrices
+    def __init__(self, document: Document, nodes: dict[int, Node], weights: dict[int, Track]) -> None:
+        self._document, self._nodes, self._weights = document, nodes, weights
+        self._matrices = {index: node.matrix for index, node in nodes.items()}
         self.raws: list[tuple[RawMesh, Any]] = []  # with the numbers of their materials
         self._primitives: dict[int, list[Primitive]] = {}
         self._skins: dict[int, Skin] = {}
+        self._joints: dict[int, Joints] = {}  # of skins that move
         self._made: dict[Any, list[int]] = {}  # indices among `raws`, by mesh, skin and weights
         self._skinned: set[int] = set()  # of them
         self._of: list[int] = []  # index among `raws` of each placed mesh
         self._where: list[Matrix] = []
+        self._motions: list[Motion | None] = []
         self._names: list[str] = []
 
     def place(self, node: Node) -> None:
@@ -88,41 +104,48 @@ class _Meshes:
         limits.check_meshes(document.name, len(self.raws))
         if not parts:
             return
-        matrices = self._placements(node, parts)
-        total = len(self._of) + len(matrices) * len(parts)
+        local = self._placements(node, parts)
+        total = len(self._of) + len(local) * len(parts)
         if total > limits.instances:
             most = f"{limits.instances} (LoadLimits.instances)"
             place = f"{document.name}: nodes[{node.index}]"
             raise LimitError(f"{place}: its nodes place {total} meshes so far; the limit is {most}")
-        self._of += parts * len(matrices)
-        self._names += _names_of_parts(node, len(parts)) * len(matrices)
-        where = matrices.repeat(len(parts), 0)
+        self._of += parts * len(local)
+        self._names += _names_of_parts(node, len(parts)) * len(local)
+        where = (node.matrix @ local).repeat(len(parts), 0)
+        motions = _motions(node, local)
+        by_joints = [part in self._skinned for part in parts]
         if self._skinned:  # whose joints place them
-            where[[part in self._skinned for part in parts] * len(matrices)] = IDENTITY
+            where[by_joints * len(local)] = IDENTITY
         self._where.append(where)
+        self._motions += [None if skinned else motion for motion in motions for skinned in by_joints]
 
     def places(self) -> Places:
         """Return the placements; the walk meets the last node first, as trimesh does."""
         if not self._of:
             return Places()
-        return Places(np.array(self._of[::-1], np.intp), np.concatenate(self._where)[::-1], self._names[::-1])
+        of, where = np.array(self._of[::-1], np.intp), np.concatenate(self._where)[::-1]
+        return Places(of, where, self._names[::-1], motions=self._motions[::-1])
 
     def _placements(self, node: Node, parts: list[int]) -> Matrix:
-        """Return the matrices (n, 4, 4) of the instances of a node."""
+        """Return the matrices (n, 4, 4) of the instances of a node to the node."""
         document = self._document
         if "extensions" not in node.json:
-            return node.matrix[None]
+            return IDENTITY[None]
         with document.part(f"nodes[{node.index}].{INSTANCING}", "the mesh once in its place"):
             count = count_placements(document, node)
             if len(self._of) + count * len(parts) > document.files.limits.instances:
-                return np.broadcast_to(node.matrix, (count, 4, 4))  # which is refused
+                return np.broadcast_to(IDENTITY, (count, 4, 4))  # which is refused
             return placements(document, node, count)
-        return node.matrix[None]
+        return IDENTITY[None]
 
     def _parts(self, node: Node) -> list[int]:
         """Return the indices of a mesh's parts among `raws`; the mesh is read at its first use."""
         mesh: Any = node.json["mesh"]
-        key = repr(mesh), repr(node.json.get("skin")), repr(node.json.get("weights"))
+        own = (
+            node.index if node.index in self._weights else None
+        )  # a node whose weights move has its own mesh
+        key = repr(mesh), repr(node.json.get("skin")), repr(node.json.get("weights")), own
         if key not in self._made:
             if not isinstance(mesh, int) or mesh not in self._primitives:
                 self._primitives[mesh] = primitives(self._document, mesh)
@@ -137,7 +160,7 @@ class _Meshes:
         return self._made[key]
 
     def _posed(self, node: Node, part: Primitive) -> RawMesh:
-        """Return the mesh of a primitive at rest."""
+        """Return the mesh of a primitive at the start of the animation, with how it deforms."""
         document, skin, count = self._document, self._skin(node), len(part.bend.targets)
         weights = np.zeros(count)
         if skin is None and not count:
@@ -147,7 +170,20 @@ class _Meshes:
                 mesh = document.get("meshes", node.json["mesh"])
                 weights = target_weights(mesh, node.json, count)
         bend = part.bend if skin is None else held(document.files.losses, part.place, part.bend, skin)
-        return pose(part.raw, bend, weights, skin, self._matrices)
+        moving = self._weights.get(node.index) if count else None
+        joints = None if skin is None else self._joints_of(node.json["skin"], skin)
+        if moving is None and (joints is None or not joints.move):
+            return pose(part.raw, bend, weights, skin, self._matrices)
+        deformation = PosedMesh(part.raw, bend, weights if moving is None else moving, skin, joints)
+        return replace(deformation.posed(deformation.start), deformation=deformation)
+
+    def _joints_of(self, number: int, skin: Skin) -> Joints:
+        """Return the joints of a skin over time, which several meshes may share."""
+        if number not in self._joints:
+            nodes = (self._nodes[index] for index in skin.nodes)
+            places = [node.matrix if node.motion is None else node.motion for node in nodes]
+            self._joints[number] = Joints(skin.nodes, places)
+        return self._joints[number]
 
     def _skin(self, node: Node) -> Skin | None:
         """Return the skin of a node, None without one or if it is damaged."""
@@ -161,6 +197,13 @@ class _Meshes:
         return None
 
 
+def _motions(node: Node, local: Matrix) -> list[Motion | None]:
+    """Return the motions to the scene of the instances of a node, by their matrices (n, 4, 4) to the node."""
+    if node.motion is None or (len(local) == 1 and np.array_equal(local[0], IDENTITY)):
+        return [node.motion] * len(local)
+    return [Product(node.motion, matrix) for matrix in local]
+
+
 def _names_of_parts(node: Node, parts: int) -> list[str]:
     """Return the names of the shapes of a node; "" if it has none."""
     name = printable(str(node.json.get("name") or ""))
@@ -171,20 +214,21 @@ def _add_others(document: Document, out: Contents, node: Node) -> None:
     """Add the camera and the light of a node."""
     if "camera" in node.json:
         with document.part(f"nodes[{node.index}].camera"):
-            _add_camera(document, out, node.json["camera"], node.matrix)
+            _add_camera(document, out, node.json["camera"], node)
     with document.part(f"nodes[{node.index}].extensions"):
         light = node.json.get("extensions", {}).get("KHR_lights_punctual", {}).get("light")
         if light is not None:
-            _add_light(document, out, light, node.matrix)
+            _add_light(document, out, light, node)
 
 
-def _add_camera(document: Document, out: Contents, index: Any, matrix: Matrix) -> None:
+def _add_camera(document: Document, out: Contents, index: Any, node: Node) -> None:
     if out.camera is not None:
         document.lose("further cameras", f"cameras[{shown(index)}]")
         return
     camera = document.get("cameras", index)
     with document.inside(f"cameras[{index}]"):
-        out.camera = _camera(camera, matrix)
+        out.camera = _camera(camera, node.matrix)
+        out.camera.motion = node.motion
 
 
 def _camera(camera: dict[str, Any], matrix: Matrix) -> Camera:
@@ -212,7 +256,7 @@ def _positive(lens: dict[str, Any], key: str, default: float | None) -> float:
     return value
 
 
-def _add_light(document: Document, out: Contents, index: Any, matrix: Matrix) -> None:
+def _add_light(document: Document, out: Contents, index: Any, node: Node) -> None:
     """Add a light of KHR_lights_punctual; candela count as W/sr, of 1 lm/W."""
     lights = document.json.get("extensions", {}).get("KHR_lights_punctual", {}).get("lights", [])
     if not isinstance(index, int) or not 0 <= index < len(lights):
@@ -221,9 +265,10 @@ def _add_light(document: Document, out: Contents, index: Any, matrix: Matrix) ->
         light = lights[index]
         if "range" in light:
             document.lose("range of a light", f"light {index}")
+        matrix = node.matrix if node.motion is None else IDENTITY
         found = punctual_light(light, matrix, document.files.losses, f"light {index}")
         if found is None:
             document.lose(f"{light.get('type')} light", f"light {index}")
         else:
             found.efficacy = OF_CANDELA
-            out.lights = [*out.lights, found]
+            out.lights = [*out.lights, found if node.motion is None else found.transformed(node.motion)]
