@@ -18,7 +18,7 @@ from ..colors import EFFICACY
 from ..compile.program import Leg
 from ..compile.scene import CompiledScene
 from ..core.errors import SceneError
-from ..film.aov_names import AOVS, CLAMPED, KEYED_AOVS, LUX, NARROW
+from ..film.aov_names import AOVS, CLAMPED, KEYED_AOVS, LUX, NARROW, is_noted
 from ..film.aov_samples import BOUNDED, AovSamples, FixedPointSamples, fixed_point
 from ..stages.compact import compact
 from ..stages.interaction import interaction
@@ -29,6 +29,7 @@ from .direct_light import DirectLight, depth_after
 from .light_by_group import LightByGroup
 from .lux import lux_of
 from .narrow_lobes import NarrowLobes
+from .noted import Noted
 
 FEATURES = ("denoising_albedo", "denoising_normal")
 OF_LIGHT = ("direct", "indirect", "light_groups", CLAMPED)
@@ -77,6 +78,8 @@ class SampleRecorder(PathRecorder):
         self._groups = LightByGroup(scene.light_groups, n) if "light_groups" in wanted else None
         if self._groups is not None:
             self._light.update((f"light_groups.{name}", light) for name, light in self._groups.items())
+        self._noted = Noted([name for name in wanted if is_noted(name)], n)
+        self._light.update(self._noted.values)
         several = LUX in wanted and len(scene.light_efficacies.names) > 1  # else it follows from the radiance
         self._efficacies = LightByGroup(scene.light_efficacies, n) if several else None
         self._divided = [each for each in (self._groups, self._efficacies) if each is not None]
@@ -225,6 +228,10 @@ class SampleRecorder(PathRecorder):
         for each in self._divided:
             each.record(paths, contribution, slot, arriving)
 
+    def note(self, name: str, paths: Paths, values: Floats) -> None:
+        """Record numbers of a user's own; see `integrators.note`."""
+        self._noted.note(name, paths, values, self._share)
+
     def record_background(self, slot: Ints, color: Floats) -> None:
         """Record what has arrived of a background, (3, k), and has been added to slots (k,)."""
         if self._direct is not None:
@@ -289,6 +296,7 @@ class SampleRecorder(PathRecorder):
 
     def _check(self, integrator: object, radiance: Floats) -> None:
         label = getattr(integrator, "__name__", repr(integrator))
+        self._noted.check(label)
         for name in self._wanted:
             needs_light = name in OF_LIGHT or (name == LUX and self._efficacies is not None)
             if needs_light and self._picture is not radiance:
@@ -296,7 +304,7 @@ class SampleRecorder(PathRecorder):
                     f"the integrator {label} cannot give the AOV {name!r}: all light must be added by "
                     "wavefront.integrators.accumulate to the array that it returns"
                 )
-            if name not in (*OF_LIGHT, LUX, NARROW) and not self._begun:
+            if name not in (*OF_LIGHT, LUX, NARROW) and not is_noted(name) and not self._begun:
                 raise SceneError(
                     f"the integrator {label} cannot give the AOV {name!r}: its paths must find their "
                     "surfaces by wavefront.integrators.intersect_and_compact"

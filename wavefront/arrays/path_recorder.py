@@ -56,6 +56,9 @@ class PathRecorder:
     ) -> None:
         """Record light `arriving` (3, k) that has been added to slots (k,) of the `picture` (3, n)."""
 
+    def note(self, name: str, paths: Paths, values: Floats) -> None:
+        """Record numbers (n,) or (3, n) of a user's own about paths."""
+
     def record_background(self, slot: Ints, color: Floats) -> None:
         """Record what has arrived of a background, (3, k), and has been added to slots (k,)."""
 

@@ -54,6 +54,9 @@ KEYED_AOVS: dict[str, Aov] = {  # one AOV for each key, named "light_groups.KEY"
     "light_groups": _sampled(3, "radiance by the group of the light that it comes from"),
     "coverage": _sampled(1, "part of the pixel that each shape covers, by the name of the shape"),
 }
+# numbers that integrators of a user's own note (integrators.note), one AOV for each name: "noted.NAME"
+NOTED = "noted"
+NOTED_AOVS: dict[str, Aov] = {NOTED: _sampled(3, "numbers that an integrator of your own notes")}
 CLAMPED = "clamped"
 GIVEN_AOVS: dict[str, Aov] = {  # AOVs that a setting gives, beside those that are asked for
     CLAMPED: _sampled(3, "radiance that the setting `clamp` removed"),
@@ -103,7 +106,14 @@ def geometric_names(chosen: Iterable[str]) -> tuple[str, ...]:
 
 def aov_of(name: str) -> Aov:
     """Return an AOV by its name, that of an AOV with a key such as "light_groups.sun"."""
-    return {**AOVS, **KEYED_AOVS, **GIVEN_AOVS, **MEASURED_AOVS, **SENSOR_AOVS}[name.partition(".")[0]]
+    known = {**AOVS, **KEYED_AOVS, **NOTED_AOVS, **GIVEN_AOVS, **MEASURED_AOVS, **SENSOR_AOVS}
+    return known[name.partition(".")[0]]
+
+
+def is_noted(name: str) -> bool:
+    """Return whether an AOV holds numbers that an integrator of a user's own notes."""
+    kind, _, key = name.partition(".")
+    return kind == NOTED and bool(key)
 
 
 def chosen_aovs(name: str, value: Any) -> tuple[str, ...]:
@@ -114,7 +124,7 @@ def chosen_aovs(name: str, value: Any) -> tuple[str, ...]:
     name
         What the value is called in errors.
     value
-        A name, or several: of `AOVS`, of `KEYED_AOVS`, "boxes" or "all".
+        A name, or several: of `AOVS`, of `KEYED_AOVS`, "noted.NAME", "boxes" or "all".
 
     Raises
     ------
@@ -126,13 +136,14 @@ def chosen_aovs(name: str, value: Any) -> tuple[str, ...]:
     if chosen is None:
         raise SceneError(f"{name} is {value!r}; it must be the name of an AOV, or several names")
     for each in chosen:
-        if not isinstance(each, str) or each not in (*known, ALL_AOVS):
+        if not isinstance(each, str) or (each not in (*known, ALL_AOVS) and not is_noted(each)):
             raise SceneError(
                 f"{name} has {each!r}; there are {', '.join(known)}, and {ALL_AOVS!r} for all but "
                 f"{', '.join((*KEYED_AOVS, BOXES))}{did_you_mean(each, known)}"
             )
     wanted = {*chosen, *(AOVS if ALL_AOVS in chosen else ())}
-    return tuple(each for each in known if each in wanted)
+    noted = (each for each in dict.fromkeys(chosen) if is_noted(each))
+    return (*(each for each in known if each in wanted), *noted)
 
 
 GUIDES = "denoising_albedo", "denoising_normal"  # the AOVs that guide denoisers

@@ -15,7 +15,7 @@ from ..stages.shade import direct, emitted, shading
 from .ladder import li_direct_mis, li_direct_simple, li_full, li_naive
 from .registry import INTEGRATORS, WITH_MIS, Integrator, integrator_for
 from .shared_paths import li_reuse
-from .steps import accumulate, intersect_and_compact, prepare_shading
+from .steps import accumulate, intersect_and_compact, note, prepare_shading
 
 __all__ = [
     "INTEGRATORS",
@@ -36,6 +36,7 @@ __all__ = [
     "li_full",
     "li_naive",
     "li_reuse",
+    "note",
     "prepare_shading",
     "roulette",
     "select",

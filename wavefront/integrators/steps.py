@@ -62,6 +62,41 @@ def prepare_shading(scene: CompiledScene, paths: Paths, hits: Hits) -> Shading:
     return shade
 
 
+def note(paths: Paths, name: str, values: Floats) -> None:
+    """Note numbers about paths for the AOV "noted.NAME" of a picture, in an integrator of one's own.
+
+    They are added to the samples of the paths, whose mean each pixel shows; what becomes of a path in several
+    branches counts by their mean. Where that AOV is not asked for, nothing is done. Where it is, `note` must
+    be called in each wave, if only with the paths of the camera.
+
+    Parameters
+    ----------
+    paths
+        n paths.
+    values
+        (n,) or (3, n).
+
+    Raises
+    ------
+    SceneError
+        If the values have another shape.
+
+    Examples
+    --------
+    >>> from wavefront import integrators
+    >>> def lengths(scene, paths, sampler, max_bounces):
+    ...     L = np.zeros((3, len(paths)), np.float32)
+    ...     paths, hits = integrators.intersect_and_compact(scene, paths, sampler, 0, L, mis=False)
+    ...     integrators.note(paths, "length", hits.t)
+    ...     return L
+    >>> scene = [wf.Sphere((0, 0, 0), 1), wf.Environment(1)]
+    >>> image = wf.render(scene, spp=1, size=(8, 8), integrator=lengths, aovs="noted.length")
+    >>> image.layers["noted.length"].shape
+    (8, 8, 3)
+    """
+    paths.recorder.note(name, paths, values)
+
+
 def scatter(
     scene: CompiledScene, L: Floats, paths: Paths, hits: Hits, sampler: Sampler, bounce: int
 ) -> Paths:
