@@ -382,7 +382,9 @@ def test_ks_and_ns_are_a_gloss(one, illum, ns, roughness):
     assert isinstance(found, Principled)
     assert found.base_color.ravel().tolist() == [0.25, 0.5, 1]
     assert found.roughness == pytest.approx([roughness])
-    assert found._dielectric(np.zeros(1, np.float32)).ravel() == pytest.approx([0.08, 0.04, 0.02], rel=1e-6)
+    assert found.layers().base.gloss.schlick(np.zeros(1, np.float32)).ravel() == pytest.approx(
+        [0.08, 0.04, 0.02], rel=1e-6
+    )
     assert found.specular_weight == 1
 
 
@@ -396,8 +398,9 @@ def test_the_gloss_that_blender_writes_is_that_of_principled(one):
 
 def test_a_faint_gloss_is_faint_at_grazing_angles_too(one):
     faint = one("Ks 0.05 0.05 0.05", "Ns 250").material.bsdf
-    assert faint._dielectric(np.zeros(1, np.float32)) == pytest.approx(np.full((3, 1), 0.004), rel=1e-5)
-    assert faint._dielectric(np.ones(1, np.float32)) == pytest.approx(np.full((3, 1), 0.2))
+    gloss = faint.layers().base.gloss
+    assert gloss.schlick(np.zeros(1, np.float32)) == pytest.approx(np.full((3, 1), 0.004), rel=1e-5)
+    assert gloss.schlick(np.ones(1, np.float32)) == pytest.approx(np.full((3, 1), 0.2))
 
 
 @pytest.mark.parametrize(
