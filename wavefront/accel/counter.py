@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from ..arrays.vec import Bools, Floats, Ints
+from typing import Any
+
+from ..arrays.vec import Bools, Doubles, Floats, Ints
 from .base import Accelerator, Intersections
 from .plate import surely_occluded
 
@@ -13,21 +15,25 @@ class RayCounter:
     def __init__(self, accelerator: Accelerator) -> None:
         self.name = accelerator.name
         self.nearest, self.shadow = 0, 0
-        self._accelerator = accelerator
+        self._accelerator: Any = accelerator
 
-    def closest(self, origin: Floats, direction: Floats, exclude_prim: Ints) -> Intersections:
+    def closest(
+        self, origin: Floats, direction: Floats, exclude_prim: Ints, *moment: Doubles
+    ) -> Intersections:
         """Find the nearest hits of rays (3, n)."""
         self.nearest += origin.shape[1]
-        return self._accelerator.closest(origin, direction, exclude_prim)
+        return self._accelerator.closest(origin, direction, exclude_prim, *moment)
 
-    def occluded(self, origin: Floats, direction: Floats, distance: Floats, exclude_prim: Ints) -> Bools:
+    def occluded(
+        self, origin: Floats, direction: Floats, distance: Floats, exclude_prim: Ints, *moment: Doubles
+    ) -> Bools:
         """Return True for each of the rays (3, n) that something blocks."""
         self.shadow += origin.shape[1]
-        return self._accelerator.occluded(origin, direction, distance, exclude_prim)
+        return self._accelerator.occluded(origin, direction, distance, exclude_prim, *moment)
 
     def surely_occluded(
-        self, origin: Floats, direction: Floats, distance: Floats, exclude_prim: Ints
+        self, origin: Floats, direction: Floats, distance: Floats, exclude_prim: Ints, *moment: Doubles
     ) -> tuple[Bools, Bools]:
         """Return which rays hit something opaque, (n,), and which others may be blocked, (n,)."""
         self.shadow += origin.shape[1]
-        return surely_occluded(self._accelerator, origin, direction, distance, exclude_prim)
+        return surely_occluded(self._accelerator, origin, direction, distance, exclude_prim, *moment)

@@ -69,7 +69,7 @@ class InstanceAccelerator:
             for number, at in self._by_mesh(instance):
                 lanes, some = lane.take(at), instance.take(at)
                 rays = self._local(origin, direction, excluded, lanes, some)
-                found = self._meshes[number].closest(*rays)
+                found = self._mesh(number, lanes).closest(*rays)
                 found.prim += np.where(found.prim >= 0, self.placements.first.take(some), 0)
                 _update_closest(hits, lanes, found)
         return hits
@@ -83,11 +83,15 @@ class InstanceAccelerator:
             for number, at in self._by_mesh(instance):
                 lanes, some = lane.take(at), instance.take(at)
                 start, along, excluded_prim = self._local(origin, direction, excluded, lanes, some)
-                met = self._meshes[number].occluded(start, along, distance.take(lanes), excluded_prim)
+                met = self._mesh(number, lanes).occluded(start, along, distance.take(lanes), excluded_prim)
                 lanes = lanes.compress(met)
                 blocked[lanes] = True
                 t_far[lanes] = -1  # ends the search
         return blocked
+
+    def _mesh(self, number: int, lanes: Ints) -> Accelerator:
+        """Return the accelerator of a mesh, for rays `lanes` (p,)."""
+        return self._meshes[number]
 
     def _exclude_single(self, exclude_prim: Ints) -> Ints:
         """Return the excluded primitives (n,), -1 for those of instances."""
@@ -102,7 +106,7 @@ class InstanceAccelerator:
         self, origin: Floats, direction: Floats, excluded: tuple[Ints, Ints], lane: Ints, instance: Ints
     ) -> tuple[Floats, Floats, Ints]:
         """Return rays `lane` (p,) in mesh coordinates of `instance` (p,): origin, direction, exclude_prim."""
-        m = self.placements.to_local.take(instance, 1).reshape(3, 4, -1)
+        m = self._matrices(lane, instance).reshape(3, 4, -1)
         x, y, z = origin.take(lane, 1)
         dx, dy, dz = direction.take(lane, 1)
         start, along = np.empty((3, lane.size), f4), np.empty((3, lane.size), f4)
@@ -112,6 +116,10 @@ class InstanceAccelerator:
             along[axis] = a * dx + b * dy + c * dz
         excluded_instance, triangle = (of_lane.take(lane) for of_lane in excluded)
         return start, along, np.where(excluded_instance == instance, triangle, -1)
+
+    def _matrices(self, lane: Ints, instance: Ints) -> Doubles:
+        """Return the matrices (12, p) from the scene to the coordinates of `instance` (p,)."""
+        return self.placements.to_local.take(instance, 1)
 
     def _by_mesh(self, instance: Ints) -> Iterator[tuple[int, Ints]]:
         """Yield each distinct mesh of `instance` (p,), and the indices of its instances there."""

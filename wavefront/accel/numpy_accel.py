@@ -26,7 +26,7 @@ def leaf_size_for(primitives: int) -> int:
     return 16 if LARGE <= primitives < HUGE else 32
 
 
-def _batch_size(leaves: int) -> int:
+def batch_size(leaves: int) -> int:
     """Return how many rays to trace at a time: enough to fill blocks of rays, few enough for the cache."""
     if not leaves:
         return BATCH
@@ -64,7 +64,7 @@ class NumpyAccelerator:
                 first += len(kind)
         searches = [self._triangles, *self._curved]
         trees = [search.tree for search in searches if search is not None]
-        self._batch = _batch_size(sum(len(tree.leaves) for tree in trees if tree))
+        self._batch = batch_size(sum(len(tree.leaves) for tree in trees if tree))
 
     def _search_triangles(
         self, geometry: Geometry, leaf_size: int | None

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import replace
-from typing import Self
+from typing import Any, Self
 
 import numpy as np
 
@@ -208,15 +208,21 @@ def beside_plate(
 
 
 def surely_occluded(
-    accelerator: Accelerator, origin: Floats, direction: Floats, distance: Floats, exclude_prim: Ints
+    accelerator: Accelerator,
+    origin: Floats,
+    direction: Floats,
+    distance: Floats,
+    exclude_prim: Ints,
+    *moment: Doubles,
 ) -> tuple[Bools, Bools]:
     """Return which rays (3, n) hit something opaque, (n,), and which others may be blocked, (n,).
 
     Accelerators that do not know what is opaque leave all of those that hit anything.
     """
+    rays: tuple[Any, ...] = (origin, direction, distance, exclude_prim, *moment)
     ask = getattr(accelerator, "surely_occluded", None)
     if ask is None:
-        met = accelerator.occluded(origin, direction, distance, exclude_prim)
+        met = accelerator.occluded(*rays)
         return np.zeros_like(met), met
-    blocked, met = ask(origin, direction, distance, exclude_prim)
+    blocked, met = ask(*rays)
     return blocked, met

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from copy import copy
 from functools import partial
+from typing import Self
 
 import numpy as np
 
@@ -52,6 +54,12 @@ class PrimitiveTree:
         self.tree = build_bvh(primitives, ids, leaf_size, WIDTH, ball)
         self._slots = ids.take(self.tree.prim)
         self.tree.leaves = self._leaf_matrices(leaf_size)
+
+    def of(self, primitives: Primitives) -> Self:
+        """Return the same tree over primitives in other states, which it bounds, too."""
+        found = copy(self)
+        found._primitives = primitives
+        return found
 
     def _leaf_matrices(self, leaf_size: int) -> Floats:
         """Return the rows of the filter, (leaves, rows * leaf_size, columns); NaN where a leaf has none."""

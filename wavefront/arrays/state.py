@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from .frame import Frame
 from .path_recorder import NOBODY, PathRecorder
 from .soa import soa
-from .vec import Bools, Bytes, Floats, Ints, Lanes, take
+from .vec import Bools, Bytes, Doubles, Floats, Ints, Lanes, take
 
 Words = NDArray[np.uint32]
 
@@ -35,6 +35,7 @@ UNITS = {
     **dict.fromkeys(("origin", "prev_vertex", "point", "error", "t"), "scene units"),
     **dict.fromkeys(("glow", "radiance"), "W/(sr m²)"),
     "pdf": "1/sr",
+    "time": "s",
 }
 FIRST = 3  # columns that are shown
 
@@ -146,6 +147,8 @@ class Rays(SoA):
     exclude_prim: Ints  # (n,) primitive that the ray starts on, -1 for none
     # (4, n) stack of what the rays are inside of; None in scenes without a `MediaTable`
     media: Any = field(default=None, kw_only=True)
+    # (n,) time of the scene, s, float64; None in scenes where nothing moves while the shutter is open
+    time: Doubles | None = field(default=None, kw_only=True)
 
 
 @soa
@@ -249,6 +252,7 @@ class SurfaceInteraction(SoA):
     # (3, n) from the points to the round surface that normals of vertices stand for; None where none do
     lift: Floats | None = None
     index_around: Floats | None = None  # (n,) of refraction, outside of the surfaces; None where it is 1
+    time: Doubles | None = None  # (n,) of the rays that have hit them, s; None where they have none
 
     def frame(self) -> Frame:
         """Return the shading frames, z = ns."""

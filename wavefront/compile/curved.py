@@ -12,9 +12,12 @@ from ..arrays.vec import ALL, Doubles, Floats, Ints, Lanes, f4, put, take
 from ..shapes import CurvedShape
 
 
-def order_by_kind(shapes: Sequence[CurvedShape]) -> list[int]:
-    """Return the indices of shapes in the order of the table of kinds, and of one kind in their own order."""
-    kinds = [KINDS.index(kind_of(shape)) for shape in shapes]
+def order_by_kind(shapes: Sequence[CurvedShape], moves: Sequence[bool]) -> list[int]:
+    """Return the indices of shapes in the order of the table of kinds, and of one kind in their own order.
+
+    Those that move come last.
+    """
+    kinds = [(moving, KINDS.index(kind_of(shape))) for shape, moving in zip(shapes, moves, strict=True)]
     return sorted(range(len(shapes)), key=kinds.__getitem__)
 
 
@@ -27,12 +30,17 @@ class CurvedTable:
     colors: Floats | None  # (4, k) linear RGB and opacity; None if all are opaque white
 
     @classmethod
-    def of(cls, shapes: Sequence[CurvedShape], center: Doubles) -> CurvedTable:
-        """Return the primitives of shapes, which `order_by_kind` has ordered, relative to `center` (3,)."""
+    def of(cls, shapes: Sequence[CurvedShape], center: Doubles, moving: int = 0) -> CurvedTable:
+        """Return the primitives of shapes, which `order_by_kind` has ordered, relative to `center` (3,).
+
+        Each of the last `moving` shapes is a kind by itself.
+        """
         members: dict[type[CurvedPrimitives], list[CurvedShape]] = {}
-        for shape in shapes:
+        still = len(shapes) - moving
+        for shape in shapes[:still]:
             members.setdefault(kind_of(shape), []).append(shape)
-        kinds = tuple(kind.from_shapes(some, center) for kind, some in members.items())
+        groups = [*members.items(), *((kind_of(shape), [shape]) for shape in shapes[still:])]
+        kinds = tuple(kind.from_shapes(some, center) for kind, some in groups)
         ends = np.cumsum([len(kind) for kind in kinds], dtype=np.intp)
         colors = None
         if any(shape.colors is not None for shape in shapes):

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 
 import numpy as np
 
@@ -58,18 +58,20 @@ def _times(m: Floats, vectors: Floats) -> Floats:
 
 
 def sort_shapes(
-    shapes: Sequence[Shape], most_copies: int
+    shapes: Sequence[Shape], most_copies: int, moving: Collection[int] = ()
 ) -> tuple[list[Mesh], list[CurvedShape], list[Instance], Ints]:
     """Sort shapes by kind, and convert instances to meshes where sharing has no advantage.
 
-    The last result has the positions in `shapes` of all these meshes, curved shapes and instances.
+    The last result has the positions in `shapes` of all these meshes, curved shapes and instances. Those
+    instances whose numbers are in `moving` are kept.
 
     These are all instances, if they have no more than `most_copies` triangles together; instances of
     emitting meshes, because each triangle is a light; the only instance of a mesh; very skewed instances,
     because float32 is not precise enough in the mesh's coordinates; and those that overlap other shapes in a
     plane.
     """
-    kept = _kept_instances(shapes, most_copies)
+    still = [shape for number, shape in enumerate(shapes) if number not in moving] if moving else shapes
+    kept = _kept_instances(still, most_copies)
     meshes: list[Mesh] = []
     curved: list[CurvedShape] = []
     instances: list[Instance] = []
@@ -83,13 +85,13 @@ def sort_shapes(
             numbers[1].append(number)
         elif not isinstance(shape, Instance):
             raise SceneError(f"{shape.name}: cannot trace a {type(shape).__name__}")
-        elif id(shape) in kept:
+        elif id(shape) in kept or number in moving:
             instances.append(shape)
             numbers[2].append(number)
         else:
             meshes.append(shape.to_mesh())
             numbers[0].append(number)
-    order = order_by_kind(curved)
+    order = order_by_kind(curved, [number in moving for number in numbers[1]])
     positions = [*numbers[0], *(numbers[1][at] for at in order), *numbers[2]]
     return meshes, [curved[at] for at in order], instances, np.array(positions, np.intp)
 

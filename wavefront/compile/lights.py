@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any, TypeAlias
 
 import numpy as np
@@ -30,11 +30,14 @@ from ..lights import (
 from ..lights.choice import LightSamplerMaker
 from ..lights.textured_emission import has_textured_emission, mean_radiance
 from ..lights.textured_sphere import mean_sphere_radiance
+from ..motion.steps import Motions
 from ..scene import Scene
 from ..shapes import CurvedShape, Mesh, Shape, Sphere, Spheres
 from ..shapes.attributes import ATTRIBUTES
 from ..textures.base import BaseTexture
 from .light_groups import GroupNumbers, primitive_count
+from .motion import MotionTable
+from .moving_lights import moving_light, moving_parts
 
 # A record, and the primitives of its lights: (..., k) a column per light, or (..., m) of one light, or none.
 Part: TypeAlias = tuple[LightRecord, Ints | None]
@@ -61,6 +64,8 @@ def gather_lights(
     choice: str | LightSamplerMaker,
     mis: bool,
     glowing: Sequence[LightRecord] = (),
+    motion: MotionTable | None = None,
+    light_motions: tuple[Motions | None, Mapping[int, int]] = (None, {}),
 ) -> tuple[LightTable, GroupNumbers, Ints, int]:
     """Return the lights, what tells them apart, and the light of each primitive and of rays that miss.
 
@@ -78,6 +83,10 @@ def gather_lights(
         As for `compile_scene`.
     glowing
         The lights of media; they are the last ones before those at infinity, in the default group.
+    motion
+        What moves while a shutter is open.
+    light_motions
+        How lights move, and which does how, by their numbers.
 
     Raises
     ------
@@ -86,7 +95,12 @@ def gather_lights(
     """
     traced: list[Mesh | CurvedShape] = [*meshes, *curved]
     first_row, primitives = _first_rows(traced)
-    parts: list[Part] = [*_area_lights(meshes, vertices), *_sphere_lights(curved, first_row, center)]
+    parts: list[Part] = [
+        *_area_lights(meshes, vertices, motion),
+        *_sphere_lights(curved, first_row, center),
+    ]
+    if motion is not None:
+        parts = [each for part in parts for each in moving_parts(*part, motion)]
     groups = GroupNumbers()
     of_row = groups.of_shapes(traced)
     for _, rows in parts:
@@ -95,8 +109,10 @@ def gather_lights(
     kinds_of_light: dict[object, list[tuple[LightRecord, int]]] = {}
     infinite: list[InfiniteLight] = []
     surfaces: list[tuple[Part, int]] = []
-    for light in scene.lights:
+    for number, light in enumerate(scene.lights):
         record = _checked_record(light, scale, center)
+        if number in light_motions[1]:
+            record = moving_light(light, record, light_motions[0], light_motions[1][number])
         if isinstance(record, InfiniteLight):
             infinite.append(record.compensated() if mis else record)
             groups.add_to_environment(light, infinite[-1])
@@ -221,7 +237,9 @@ def _lights_of_spheres(shape: Any, center: Doubles) -> SphereLights:
     return SphereLights(middles, radii, radiance)
 
 
-def _area_lights(meshes: Sequence[Mesh], vertices: Sequence[Doubles]) -> list[Part]:
+def _area_lights(
+    meshes: Sequence[Mesh], vertices: Sequence[Doubles], motion: MotionTable | None
+) -> list[Part]:
     """Return the emitting rectangles and triangles of all meshes, a record for each kind.
 
     Only uniform emission is taken for rectangles, as their points have no barycentric weights.
@@ -241,6 +259,8 @@ def _area_lights(meshes: Sequence[Mesh], vertices: Sequence[Doubles]) -> list[Pa
     source = source_of[mesh_of]
     shining = _with_area(meshes, mesh_of, triangles)
     even = shining[source[shining] < 0]
+    if motion is not None:  # what deforms is made of triangles
+        even = even[motion.is_rigid(face[even])]
     first = first_of_pairs(triangles[even], mesh_of[even])
     pairs = even[np.stack([first, first + 1])]
     alone = shining[~np.isin(shining, pairs)]

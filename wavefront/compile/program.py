@@ -14,8 +14,9 @@ from dataclasses import field, replace
 from typing import TYPE_CHECKING, Any, ClassVar, Self, TypeVar
 
 from ..arrays.soa import soa
-from ..arrays.state import Contribution, Hits, Paths, Rays, SurfaceInteraction
+from ..arrays.state import Contribution, Hits, Paths, Rays, SurfaceInteraction, Words
 from ..arrays.vec import Bools, Floats, Ints, Lanes, length
+from ..camera import Camera
 from ..core.errors import SceneError, in_brief
 from ..materials import Material
 from ..sampling.sampler import Dimension, Sampler, numbers_of
@@ -143,6 +144,9 @@ class Feature:
     def begin(self, scene: CompiledScene, paths: Paths) -> None:
         """Give paths that start at the camera the columns that they need."""
 
+    def expose(self, scene: CompiledScene, camera: Camera, rays: Rays, pixel: Words, u: Floats) -> None:
+        """Give rays of a camera, through pixels (n,) of the whole picture, times by u (n,) in [0, 1)."""
+
     def fly(self, leg: Leg) -> None:
         """Change paths and their hits, before any light is added."""
 
@@ -223,7 +227,7 @@ class Program:
 
     Attributes
     ----------
-    begin, walk, cross, dim, tilt, weaken
+    expose, begin, walk, cross, dim, tilt, weaken
         What acts at these points.
     shading, surfaces
         What surfaces are when they are shaded, and when they are hit, the outermost kind first.
@@ -243,8 +247,9 @@ class Program:
         self.features = tuple(features)
         everywhere = [each for each in features if not each.camera_only]
         self._camera, self._later = LegProgram(self.features), LegProgram(everywhere)
-        self.begin, self.walk, self.cross, self.dim, self.tilt, self.weaken = (
-            _at(self.features, point) for point in ("begin", "walk", "cross", "dim", "tilt", "weaken")
+        self.expose, self.begin, self.walk, self.cross, self.dim, self.tilt, self.weaken = (
+            _at(self.features, point)
+            for point in ("expose", "begin", "walk", "cross", "dim", "tilt", "weaken")
         )
         self.shading, self.surfaces = (
             tuple(getattr(each, name) for each in reversed(self.features) if getattr(each, name) is not None)

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from ..accel import Accelerator, Geometry, InstanceAccelerator
+from ..accel import Accelerator, Geometry
 from ..accel.plate import beside_plate
 from ..arrays.soa import soa
 from ..arrays.vec import Bools, Doubles, Floats, Ints
@@ -34,6 +34,9 @@ from .materials import (
 )
 from .media import MediaTable, glow_lights, media_of, media_table, phase_materials
 from .morton import AnyOrder, MortonGrid
+from .exposure import exposed_scene
+from .motion import MotionTable, curved_that_move, light_motions, motion_table, place_accelerators
+from .moving_curved import with_curved
 from .program import Facts, Program
 from .scale import check_distance, check_lights, length_factor, scaled_shapes
 from .shape_numbers import ShapeNumbers, number_shapes
@@ -72,6 +75,7 @@ class CompiledScene:
     light_groups: LightGroups[str]
     light_efficacies: LightGroups[float]  # lm/W, for measurements
     instances: InstanceTable | None = None  # None when no mesh is instanced
+    motion: MotionTable | None = None  # None where nothing moves while a shutter is open
     places: MortonGrid | AnyOrder = AnyOrder()  # orders the paths of large scenes
     roulette_after: float = ROULETTE_AFTER  # scattering events before Russian roulette may end paths
     specular_surfaces: SpecularSurfaces | None = None  # for light tracing; None without it
@@ -141,14 +145,16 @@ def gather_scene(
         cannot emit light, a light is malformed, too far away or too strong for the scene's size, or the
         choice is unknown.
     """
-    asked, (low, high) = asked or {}, scene.bounds
+    asked = asked or {}
+    exposed = exposed_scene(scene, asked.get("shutter"))
+    scene, (low, high) = exposed.scene, exposed.bounds
     radius = float(np.linalg.norm(high - low)) / 2
     scale = length_factor(radius)
     check_lights(scene.lights, (low + high) / 2, scale)
     low, high = low * scale, high * scale
     center = (low + high) / 2
     scaled = scaled_shapes(scene.shapes, scale)
-    meshes, curved, instances, numbers = sort_shapes(scaled, most_copies)
+    meshes, curved, instances, numbers = sort_shapes(scaled, most_copies, exposed.movers)
     placed: list[Shape] = [*meshes, *curved, *instances]
     shared = list({id(instance.mesh): instance.mesh for instance in instances}.values())
     sizes = np.array([len(mesh.faces) for mesh in meshes], np.intp)
@@ -163,8 +169,42 @@ def gather_scene(
     glowing, of_media = glow_lights(media)
     phases = phase_materials(filled)
     user_materials += phases
+    moving = curved_that_move(numbers, len(curved), len(instances), exposed)
+    table_of_curved, placements, table, motion = CurvedTable.of(curved, center, moving), None, None, None
+    still = len(table_of_curved.kinds) - moving
+    if shared:
+        placements, table = place_instances(instances, shared, center, once, len(table_of_curved), replaced)
+    if moving:
+        placements, table = with_curved(
+            placements, table, table_of_curved.kinds[still:], once, len(shared), len(material_of)
+        )
+    if exposed.shutter is not None:
+        motion = motion_table(
+            exposed,
+            instances,
+            table_of_curved.kinds[still:],
+            numbers,
+            shared,
+            center,
+            scale,
+            placements,
+            once,
+            len(material_of),
+        )
     lights, numbered, light_of, environment = gather_lights(
-        scene, scaled, scale, meshes, curved, vertices, center, (high - low) / 2, light_sampler, mis, glowing
+        scene,
+        scaled,
+        scale,
+        meshes,
+        curved,
+        vertices,
+        center,
+        (high - low) / 2,
+        light_sampler,
+        mis,
+        glowing,
+        motion,
+        light_motions(exposed, center, scale, float(np.linalg.norm(high - low)) / 2),
     )
     if media is not None and glowing:
         media.light_of[of_media] = (
@@ -172,22 +212,21 @@ def gather_scene(
         )
     read = sorted({*attributes_read(placed), *lights.reads})
     attributes = {name: corner_values(name, meshes) for name in read}
-    table_of_curved = CurvedTable.of(curved, center)
     smooth = any(mesh.normals is not None for mesh in meshes)
     del vertices
     has_alpha = find_alpha(user_materials, material_of, meshes, instances)
     nonscattering_lights = find_nonscattering_lights(user_materials, material_of, light_of, len(lights))
     weights = bool(attributes) or smooth
-    shape_numbers = number_shapes(meshes, curved, instances, numbers)
+    shape_numbers = number_shapes(meshes, curved, instances, numbers, moving)
     interchangeable = None if weights else same_as_next(material_of[:once], light_of[:once], shape_of)
-    geometry = Geometry(triangles[:once], table_of_curved.kinds, weights, interchangeable)
-    accelerator, table = beside_plate(make_accelerator, geometry, has_alpha), None
-    if shared:
-        placements, table = place_instances(instances, shared, center, once, len(table_of_curved), replaced)
+    geometry = Geometry(triangles[:once], table_of_curved.kinds[:still], weights, interchangeable)
+    accelerator = beside_plate(make_accelerator, geometry, has_alpha)
+    if placements is not None:
         ends = np.cumsum([len(mesh.faces) for mesh in shared])
-        parts = np.split(triangles[once:], ends[:-1])
-        built = [make_accelerator(Geometry(part, (), weights)) for part in parts]
-        accelerator = InstanceAccelerator(accelerator, built, placements)
+        parts = np.split(triangles[once:], ends[:-1])[: len(shared)]
+        accelerator = place_accelerators(
+            accelerator, parts, placements, motion, once, weights, make_accelerator
+        )
     specular, groups_of = None, group_materials(user_materials)
     if caustics and len(lights) > int(environment >= 0):  # one is not at infinity
         whole = np.append(np.arange(once), np.arange(len(triangles), len(material_of)))
@@ -228,6 +267,7 @@ def gather_scene(
         light_groups=groups,
         light_efficacies=efficacies,
         instances=table,
+        motion=motion,
         specular_surfaces=specular,
         media=media,
         places=MortonGrid.over((high - low) / 2) if len(triangles) >= LARGE else AnyOrder(),

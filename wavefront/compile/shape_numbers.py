@@ -42,7 +42,11 @@ class ShapeNumbers:
 
 
 def number_shapes(
-    meshes: Sequence[Mesh], curved: Sequence[CurvedShape], instances: Sequence[Instance], numbers: Ints
+    meshes: Sequence[Mesh],
+    curved: Sequence[CurvedShape],
+    instances: Sequence[Instance],
+    numbers: Ints,
+    moving: int = 0,
 ) -> ShapeNumbers:
     """Return the numbers of the shapes of a compiled scene.
 
@@ -54,6 +58,8 @@ def number_shapes(
         The other shapes.
     numbers
         The positions in `Scene.shapes` of the meshes that are in the scene once, and of the other shapes.
+    moving
+        How many curved shapes, the last ones, have a column of the `InstanceTable` each.
     """
     shared = len(meshes) + len(curved) + len(instances) - len(numbers)
     once = len(meshes) - shared
@@ -62,5 +68,7 @@ def number_shapes(
     return ShapeNumbers(
         first=np.cumsum([0, *sizes])[:-1],
         of_part=np.concatenate([numbers[:once], np.full(shared, -1), numbers[once:single]]),
-        of_instance=np.concatenate([np.full(SINGLE_COLUMNS, -1), numbers[single:]]),
+        of_instance=np.concatenate(
+            [np.full(SINGLE_COLUMNS, -1), numbers[single:], numbers[single - moving : single]]
+        ),
     )

@@ -13,6 +13,7 @@ from ..arrays.soa import soa
 from ..camera import Camera
 from ..compile.scene import CompiledScene
 from ..core.progress import phase
+from ..features.view import seen_by
 from ..guiding import GuideTable
 from ..integrators.training import train
 from ..integrators.tuning import BRANCHES, Run, tuning_run
@@ -54,7 +55,9 @@ def learn_guide(settings: Settings, scene: CompiledScene, camera: Camera) -> Gui
         return None
     with phase("learning where light comes from", values["progress"]), single_threaded_blas:
         sampler = make_sampler(values["sampler"], settings.training_seed(), camera.resolution[0])
-        return train(scene.seen_by(camera), scene.view(camera), sampler, values["max_bounces"])
+        return train(
+            seen_by(scene, camera, settings.shutter), scene.view(camera), sampler, values["max_bounces"]
+        )
 
 
 def choose(

@@ -13,7 +13,7 @@ from ..camera import Camera
 from ..core.errors import SceneError
 from ..core.memory import check_memory, megabytes, resident_memory
 from ..core.plural import plural
-from ..features.view import seen_with
+from ..features.view import seen_by, seen_with
 from ..film.aov_names import LUX, aov_of
 from ..film.picture_sums import PictureSums, empty_sums
 from ..film.sums import bytes_per_pixel
@@ -149,7 +149,7 @@ def with_choice(plan: Plan, camera: Camera) -> Plan:
 def make_plan(settings: Settings, scene: PreparedScene, camera: Camera, table: GuideTable | None) -> Plan:
     """Return how the view of a camera is rendered, given what may guide its paths."""
     tracer = Tracer(
-        scene.compiled.seen_by(camera),
+        seen_by(scene.compiled, camera, settings.shutter),
         SAMPLERS.find(settings.values["sampler"]),
         settings.values["seed"],
         FILTERS.find(settings.values["filter"]),

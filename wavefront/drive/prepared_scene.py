@@ -105,7 +105,11 @@ class PreparedScene:
             most_copies(values["accel"]),
             mis=INTEGRATORS.find(values["integrator"]) in WITH_MIS,
             caustics=values["caustics"],
-            asked={"background": settings.background_color, "features": values["features"]},
+            asked={
+                "background": settings.background_color,
+                "features": values["features"],
+                "shutter": settings.shutter,
+            },
         )
 
     @cached_property

@@ -326,6 +326,7 @@ class Session:
             other_workers = (executor, self._plan.executor) == ("processes", "threads")
             other_workers |= budget.workers != self._plan.budget.workers
             other_workers |= fits_a_wave(settings, camera.size, budget) != self._plan.inline
+            other_workers |= camera.moves != self._picture.camera.moves
             table = learn_guide(settings, self._scene.compiled, camera)
             other_workers |= table is not self._plan.tracer.table
             if self._monitor.stop.value or other_workers:

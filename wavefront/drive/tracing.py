@@ -14,7 +14,7 @@ from ..aovs.recorder import SampleRecorder, recorded_aovs
 from ..arrays.path_recorder import NOBODY, PathRecorder
 from ..arrays.soa import soa
 from ..arrays.state import Words
-from ..arrays.vec import Floats, Ints, broadcast
+from ..arrays.vec import Doubles, Floats, Ints, broadcast
 from ..camera import Camera
 from ..compile.scene import CompiledScene
 from ..core.errors import SceneError
@@ -186,7 +186,9 @@ class MonitoredAccelerator(RayCounter):
         super().__init__(accelerator)
         self._monitor, self._deadline, self._surfaces = monitor, deadline, 0
 
-    def closest(self, origin: Floats, direction: Floats, exclude_prim: Ints) -> Intersections:
+    def closest(
+        self, origin: Floats, direction: Floats, exclude_prim: Ints, *moment: Doubles
+    ) -> Intersections:
         """Find the nearest hits of rays (3, n).
 
         Raises
@@ -196,4 +198,4 @@ class MonitoredAccelerator(RayCounter):
         """
         self._monitor.check(self._surfaces, self._deadline)
         self._surfaces += 1
-        return super().closest(origin, direction, exclude_prim)
+        return super().closest(origin, direction, exclude_prim, *moment)

@@ -20,6 +20,7 @@ from .dispersion import Dispersion
 from .instances import Instances
 from .interpolation import Interpolation, SmoothNormals
 from .media import Glow, Media
+from .motion import Deformations, Moments, Motion
 from .nested import Nested
 from .normal_maps import NormalMaps
 from .passing import Passing
@@ -31,7 +32,10 @@ from .unseen import Unseen
 # In the order in which they act.
 FEATURES: tuple[type[Feature], ...] = (
     Interpolation,
+    Deformations,
     Instances,
+    Motion,
+    Moments,
     SmoothNormals,
     ShadowTerminator,
     Receivers,

@@ -69,6 +69,7 @@ class InstancedSurfaces(Surfaces):
         """
         if self.instances is None:
             return corners
+        corners = super().corner_normals(corners)
         return [normalize(self.instances.normals_to_scene(corner)) for corner in corners]
 
     def vectors(self, values: Floats) -> Floats:

@@ -50,7 +50,8 @@ class SmoothSurfaces(Surfaces):
         curved = np.flatnonzero(hits.prim >= scene.triangles)
         if scene.curved.shading_normals and curved.size:
             prim = hits.prim.take(curved) - scene.triangles
-            ns[:, curved] = scene.curved.shading(prim, point.take(curved, 1), ng.take(curved, 1))
+            at = self.own_points(point).take(curved, 1)
+            ns[:, curved] = scene.curved.shading(prim, at, ng.take(curved, 1))
         return face_viewer(-self.rays.direction, ns * side)
 
     def _interpolated(self, ng: Floats) -> Floats:

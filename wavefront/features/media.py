@@ -102,7 +102,7 @@ class Media(Feature):
 
     def begin(self, scene: CompiledScene, paths: Paths) -> None:
         """Find out what paths begin inside of."""
-        paths.media = stacks_at(scene, paths.origin)
+        paths.media = stacks_at(scene, paths.origin, paths.time)
 
     def walk(self, leg: Leg, lanes: Ints, segment: int) -> Ints:
         """Let paths fly through their media, which may scatter them on the way."""

@@ -84,6 +84,8 @@ def shadow_opacity(
     lit = np.flatnonzero(total > 0)
     sample = LightSample(wi, np.zeros_like(wi), np.ones(n, f4), distance, cos_light)
     rays = shadow_rays(surface, start, sample, lit)
+    if surface.time is not None:
+        rays.time = surface.time.take(lit)
     if scene.media is not None:
         number_of = take(which, lit)
         begin_in_media(scene, rays, paths, paths.media, lit, number_of, sampler, FIRST_VERTEX)
@@ -104,7 +106,7 @@ def _candidates(
     """
     n, environment = len(surface), int(scene.light_of[-1])
     frame = surface.frame()
-    receiver = Receiver(surface.ns, np.ones(n, np.bool_))
+    receiver = Receiver(surface.ns, np.ones(n, np.bool_), time=surface.time)
     for number in range(CANDIDATES if scene.lights.choice is not None else 0):
         address = paths.pixel, paths.sample, FIRST_VERTEX + number
         u_light = sampler.draw_1d(*address, Dimension.LIGHT)

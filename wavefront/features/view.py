@@ -4,10 +4,21 @@ from __future__ import annotations
 
 from dataclasses import replace
 
+from ..camera import Camera
 from ..compile.scene import CompiledScene
 from ..guiding import GuideTable
+from ..motion.shutter import Shutter
 from .branches import Branches
 from .guide import Guide
+from .motion import Exposure
+
+
+def seen_by(scene: CompiledScene, camera: Camera, shutter: Shutter | None) -> CompiledScene:
+    """Return a scene as the first rays of a camera meet it, whose shutter is open for a time."""
+    scene = scene.seen_by(camera)
+    if shutter is None or not (scene.motion is not None or camera.moves):
+        return scene
+    return replace(scene, program=scene.program.plus(Exposure(shutter)))
 
 
 def seen_with(scene: CompiledScene, table: GuideTable | None = None, branches: int = 1) -> CompiledScene:

@@ -32,12 +32,13 @@ from ..compile.media import stacks_leaving
 from ..compile.program import Leg, Passage
 from ..compile.scene import CompiledScene
 from ..compile.specular_surfaces import SpecularPoints, SpecularSurfaces
-from ..lights import LightSample
+from ..features.motion import Exposure
+from ..lights import LightSample, Receiver
 from ..sampling.sampler import Dimension, Sampler
 from ..stages.bounce import bounce_sample
 from ..stages.compact import compact, roulette, select
 from ..stages.inside import stacks_at
-from ..stages.interaction import interaction, offset_origin, origin_above
+from ..stages.interaction import interaction, offset_origin, origin_above, query
 from ..stages.intersect import ShadowRays, intersect, shadow_rays, visible
 from ..stages.passing import pass_through
 from ..stages.shade import Shading, radiance_at_samples, shading
@@ -124,14 +125,25 @@ def _begin(
         choice[0] + choice[1] * LOWER_BITS, sampler.draw_2d(*address, 0, Dimension.SPECULAR_POINT)
     )
     u_choice = sampler.draw_1d(*address, 0, Dimension.LIGHT)
+    exposure, receiver = scene.program.find(Exposure), None
+    if exposure is not None:
+        receiver = _at_times(exposure.shutter.times(sampler.draw_1d(*address, 0, Dimension.TIME)))
     light, number = scene.lights.sample_li(
-        start.point, u_choice, sampler.draw_2d(*address, 0, Dimension.LIGHT_POINT)
+        start.point, u_choice, sampler.draw_2d(*address, 0, Dimension.LIGHT_POINT), receiver
     )
     placed = np.isfinite(light.distance) | scene.lights.delta_of.take(number)
     lanes = np.flatnonzero((light.pdf > 0) & placed)
     paths, hits = _arriving(scene, start.take(lanes), light.take(lanes), address, lanes)
+    if receiver is not None and receiver.time is not None:
+        paths.time = receiver.time.take(lanes)
     paths, hits = compact(scene, paths, hits, np.arange(lanes.size))
     return _lit(scene, specular, paths, hits, light, number, pixel.size)
+
+
+def _at_times(time: Doubles) -> Receiver:
+    """Return points that light reaches from all sides, at times (n,)."""
+    up = np.broadcast_to(np.array([[0], [0], [1]], f4), (3, time.size))
+    return Receiver(up, broadcast(np.False_, time.size), time=time)
 
 
 def _arriving(
@@ -173,7 +185,8 @@ def _lit(
     light, number = light.take(paths.slot), number.take(paths.slot)
     everything, start = np.arange(len(surface)), origin_above(surface)
     rays = shadow_rays(surface, start, light, everything)
-    rays.media = paths.media = stacks_at(scene, start)
+    rays.time = paths.time
+    rays.media = paths.media = stacks_at(scene, start, paths.time)
     arriving = radiance_at_samples(scene, rays, light, everything, number)
     arriving = arriving * _transmittance(scene, rays)
     cos = dot(surface.ng, light.wi)
@@ -192,7 +205,8 @@ def _first(scene: CompiledScene, specular: SpecularSurfaces, rays: ShadowRays) -
     Points are drawn on all faces, but of those that overlap in a plane only the first is ever hit.
     """
     away, nothing = NEARBY * rays.error, broadcast(np.intp(-1), len(rays))
-    found = scene.accelerator.closest(rays.origin + rays.direction * away, -rays.direction, nothing)
+    back = Rays(rays.origin + rays.direction * away, -rays.direction, nothing, time=rays.time)
+    found = scene.accelerator.closest(*query(scene, back))
     return ~((found.t < 2 * away) & (found.prim < specular.found_as.take(rays.exclude_prim)))
 
 
@@ -240,7 +254,7 @@ def _scatter(
         wo = take(left.direction, rough)
         stack = _around(shade, paths, rough, wo)
         point, wi = surface.point.take(rough, 1), take(surface.wo, rough)
-        weight = _towards(scene, hits.take(rough), point, wo, wi, stack)
+        weight = _towards(scene, hits.take(rough), point, wo, wi, stack, _times(paths, rough))
         pdf = take(left.pdf, rough)
         throughput[:, rough] = take(paths.throughput, rough) * np.where(
             pdf > 0, weight / np.where(pdf > 0, pdf, 1), 0
@@ -266,6 +280,11 @@ def _divided(a: Floats, b: Floats) -> Floats:
     return np.where(b > 0, a / np.where(b > 0, b, f4(1)), f4(0))
 
 
+def _times(paths: Paths, lanes: Ints) -> Doubles | None:
+    """Return the times (k,) of some lanes; None where nothing moves."""
+    return None if paths.time is None else paths.time.take(lanes)
+
+
 def _around(shade: Shading, paths: Paths, lanes: Ints, wo: Floats) -> Any:
     """Return the stacks (4, k) of light that leaves some lanes along wo (3, k); None where there are none."""
     if paths.media is None:
@@ -274,14 +293,22 @@ def _around(shade: Shading, paths: Paths, lanes: Ints, wo: Floats) -> Any:
     return stacks_leaving(take(paths.media, lanes), take(shade.crossing, lanes), cos)
 
 
-def _towards(scene: CompiledScene, hits: Hits, point: Floats, wo: Floats, wi: Floats, stack: Any) -> Floats:
+def _towards(
+    scene: CompiledScene,
+    hits: Hits,
+    point: Floats,
+    wo: Floats,
+    wi: Floats,
+    stack: Any,
+    time: Doubles | None,
+) -> Floats:
     """Return f times two cosines (3, k), given light that comes from wi (3, k) and leaves along wo (3, k).
 
-    `stack` (4, k) has what is around where it leaves. The cosines are that of wo with the geometric normal,
-    and that of wi with the shading normal over that with the geometric one, as the flux that arrives has the
-    latter.
+    `stack` (4, k) has what is around where it leaves, at times (k,). The cosines are that of wo with the
+    geometric normal, and that of wi with the shading normal over that with the geometric one, as the flux
+    that arrives has the latter.
     """
-    rays = Rays(point, -wo, broadcast(np.intp(-1), wo.shape[1]), media=stack)
+    rays = Rays(point, -wo, broadcast(np.intp(-1), wo.shape[1]), media=stack, time=time)
     shade = _prepared(scene, rays, replace(hits, t=np.zeros_like(hits.t)))
     local = shade.frame.to_local(wi)
     cos, cos_g = shade.cosines(local, wi)
@@ -304,7 +331,7 @@ def _connect(
     n = len(surface)
     address = paths.pixel[:n], paths.sample[:n], bounce
     lens = sampler.draw_2d(*address, Dimension.LENS) if camera.uses_lens else None
-    eye, film, importance = camera.connections(surface.point, scene.center, lens)
+    eye, film, importance = _connections(scene, camera, surface.point, _times(paths, np.arange(n)), lens)
     lanes = _seen(scene, camera, film, paths, hits, n)
     to_eye = take(eye, lanes) - surface.point.take(lanes, 1)
     distance = length(to_eye)
@@ -312,7 +339,8 @@ def _connect(
     seen = surface.take(lanes)
     arriving = take(flux, paths.slot.take(lanes)) * take(paths.throughput, lanes)
     stack = _around(shade, paths, lanes, wo)
-    weight = _towards(scene, hits.take(lanes), seen.point, wo, seen.wo, stack)
+    time = _times(paths, lanes)
+    weight = _towards(scene, hits.take(lanes), seen.point, wo, seen.wo, stack, time)
     radiance = arriving * (weight * importance.take(lanes).astype(f4))
     lit = np.flatnonzero(highest(radiance) != 0)
     seen, wo = seen.take(lit), take(wo, lit)
@@ -324,12 +352,24 @@ def _connect(
         distance=distance.take(lit),
         cos_light=broadcast(f4(1), lit.size),
         media=None if stack is None else take(stack, lit),
+        time=None if time is None else time.take(lit),
     )
     radiance = take(radiance, lit) * _transmittance(scene, rays, scene.program.seen_through)
     if scene.program.weaken:
         _absorb(scene, radiance, seen, wo, rays.distance)
     at = lanes.take(lit)
     return Splats(paths.slot.take(at), _pixels(camera, film.take(at, 1)), radiance)
+
+
+def _connections(
+    scene: CompiledScene, camera: Camera, point: Floats, time: Doubles | None, lens: Floats | None
+) -> tuple[Floats, Doubles, Doubles]:
+    """Return what `Camera.connections` does for points (3, n) at times (n,)."""
+    exposure = scene.program.find(Exposure)
+    if exposure is None or time is None:
+        return camera.connections(point, scene.center, lens)
+    eye, film, importance = camera.connections(exposure.to_camera(time, point), scene.center, lens)
+    return exposure.seen_from(time, eye, eye)[0], film, importance
 
 
 def _seen(scene: CompiledScene, camera: Camera, film: Doubles, rays: Rays, hits: Hits, n: int) -> Ints:

@@ -67,6 +67,7 @@ class Receiver(SoA):
     normal: Floats  # (3, n) unit shading normal
     opaque: Bools  # (n,) light from behind the normal does not count
     bins: Ints | None = None  # (n,) what images are drawn for; None where it is not found yet
+    time: Doubles | None = None  # (n,) at which the light comes, s; None where no light moves
 
 
 @soa

@@ -53,6 +53,7 @@ class Dimension(IntEnum):
     GUIDE_DIRECTION = 2**20 + 1  # 2-D: direction from the table
     SPECULAR_SURFACE = 2**20 + 2  # 2-D: which primitive a path from a light begins at
     SPECULAR_POINT = 2**20 + 3  # 2-D: where on it
+    TIME = 2**20 + 4  # 1-D: when a path is while the shutter is open
     MEDIUM = 2**21  # 2-D: where a medium scatters, by channel and distance; repeats along the ray, up to 2²²
     TRANSMITTANCE = 2**22  # of light samples through media; repeats along the ray, up to 2²³
     FEATURE = 2**23  # of a user's own features (`Feature.dimensions`), up to 2²⁴

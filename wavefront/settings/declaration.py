@@ -29,6 +29,7 @@ from ..integrators import INTEGRATORS, Integrator
 from ..lights.choice import LightSamplerMaker
 from ..lights.samplers import LIGHT_SAMPLERS
 from ..materials import NAMED_MATERIALS, MaterialLike
+from ..motion.shutter import SHUTTER_CURVES, Curve, check_shutter
 from ..sampling.filters import FILTERS, Filter
 from ..sampling.sampler import SAMPLERS, SamplerMaker
 from ..scene.lighting import DEFAULT, LIGHTINGS
@@ -372,6 +373,28 @@ class RenderSettings(TypedDict, total=False):
             "samples takes over three seconds. With `noise`, the render ends at whichever comes first.",
             option="render until this time is used",
             check=optional(above_zero),
+        ),
+    ]
+    shutter: Annotated[
+        tuple[float, float] | None,
+        Setting(
+            None,
+            "When the shutter is open, (from, until) in seconds of the scene: what moves is blurred. None "
+            "shows one moment.",
+            option="FROM,UNTIL in seconds of the scene: what moves while the shutter is open is blurred",
+            check=check_shutter,
+            identity=True,
+        ),
+    ]
+    shutter_curve: Annotated[
+        str | Curve,
+        Setting(
+            "box",
+            'How much light the shutter lets through while it is open: "box", the same all the time, or '
+            '"triangle", most in the middle. docs/motion_blur.md has one of your own.',
+            option="how the shutter opens and closes",
+            choices=SHUTTER_CURVES,
+            identity=True,
         ),
     ]
     filter: Annotated[

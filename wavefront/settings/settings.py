@@ -13,6 +13,7 @@ from ..film.aov_names import CLAMPED, GUIDES, chosen_aovs, sampled_names
 from ..film.exact_sum import MAX_TERMS
 from ..integrators import INTEGRATORS, li_full
 from ..integrators.tuning import BRANCHES
+from ..motion.shutter import SHUTTER_CURVES, Shutter
 from ..sampling.sampler import make_sampler
 from ..stages.reuse import SHARED_WAYS
 from ..workers.executors import ExecutorLike, choose_executor, worker_count
@@ -154,6 +155,12 @@ class Settings:
         """Scattering events before Russian roulette may end paths; infinite where it may not."""
         roulette = self.values["roulette"]
         return np.inf if roulette is False else roulette
+
+    @property
+    def shutter(self) -> Shutter | None:
+        """When the shutter is open, and how much light it lets through then; None for one moment."""
+        open_, curve = self.values["shutter"], self.values["shutter_curve"]
+        return None if open_ is None else Shutter(*open_, SHUTTER_CURVES.find(curve))
 
     @property
     def sampled_aovs(self) -> tuple[str, ...]:

@@ -71,6 +71,7 @@ def bounce_sample(paths: Paths, shade: Shading, sampler: Sampler, bounce: int) -
         specular=specular,
         roulette_scale=roulette_scale,
         media=paths.media,
+        time=paths.time,
         light_traced=paths.light_traced,
         depth=paths.depth,
         met_rough=paths.met_rough,

@@ -45,12 +45,17 @@ def generate(
         roulette_scale=broadcast(f4(1) if sensor is None else f4(1) / sensor.total, n),
         sensor=sensor,
     )
+    for expose in scene.program.expose:
+        expose(scene, camera, paths, pixel, sampler.draw_1d(pixel, sample, 0, Dimension.TIME))
     for begin in scene.program.begin:
         begin(scene, paths)
     return paths
 
 
 def center_rays(scene: CompiledScene, camera: Camera, pixel: Words) -> Rays:
-    """Return the rays through the centers of pixels (n,) and the center of the lens."""
+    """Return the rays through the centers of pixels (n,) and of the lens, when the shutter is half over."""
     origin, direction = camera.pixel_rays(camera.address(pixel), HALF, scene.center)
-    return Rays(origin, direction, np.full(len(pixel), -1, np.intp))
+    rays = Rays(origin, direction, np.full(len(pixel), -1, np.intp))
+    for expose in scene.program.expose:
+        expose(scene, camera, rays, camera.address(pixel), broadcast(f4(0.5), len(pixel)))
+    return rays

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..arrays.state import Rays
-from ..arrays.vec import Floats, f4, take
+from ..arrays.vec import Doubles, Floats, f4, take
 from ..compile.media import DEPTH, ENTRY
 from ..compile.scene import CompiledScene
 from .interaction import interaction
@@ -20,8 +20,8 @@ OUTWARD = np.array([[0.5337], [0.6129], [0.5827]], f4)  # any direction along wh
 MOST_SURFACES = 1 << 12  # on the way out of a scene
 
 
-def stacks_at(scene: CompiledScene, origin: Floats) -> Any:
-    """Return what points (3, n) are inside of, (4, n); None where the scene needs no stacks.
+def stacks_at(scene: CompiledScene, origin: Floats, time: Doubles | None = None) -> Any:
+    """Return what points (3, n) are inside of at times (n,), (4, n); None where the scene needs no stacks.
 
     A ray leads out of the scene from each: what it leaves without having entered it is around the point, the
     innermost first.
@@ -36,19 +36,20 @@ def stacks_at(scene: CompiledScene, origin: Floats) -> Any:
     if not lanes.size:
         return stack
     start = take(origin, lanes)
-    alike = bool((start == start[:, :1]).all())  # such as those of a pinhole camera
-    found = _enclosing(scene, start[:, :1] if alike else start)
+    alike = time is None and bool((start == start[:, :1]).all())  # such as those of a pinhole camera
+    found = _enclosing(scene, start[:, :1] if alike else start, None if time is None else time.take(lanes))
     stack[:, lanes] = found
     return stack
 
 
-def _enclosing(scene: CompiledScene, origin: Floats) -> NDArray[Any]:
-    """Return the stacks (4, n) of points (3, n), by rays out of the scene."""
+def _enclosing(scene: CompiledScene, origin: Floats, time: Doubles | None) -> NDArray[Any]:
+    """Return the stacks (4, n) of points (3, n) at times (n,), by rays out of the scene."""
     media, n = scene.media, origin.shape[1]
     assert media is not None
     stack, depth = np.zeros((DEPTH + 1, n), ENTRY), np.zeros(n, np.intp)
     open_ = np.zeros((media.priority.size, n), np.int32)  # entered on the way, and not left yet
-    rays = Rays(origin, np.repeat(OUTWARD / np.sqrt((OUTWARD**2).sum()), n, 1), np.full(n, -1, np.intp))
+    outward = np.repeat(OUTWARD / np.sqrt((OUTWARD**2).sum()), n, 1)
+    rays = Rays(origin, outward, np.full(n, -1, np.intp), time=time)
     lanes = np.arange(n)
     for _ in range(MOST_SURFACES):
         hits = intersect(scene, rays)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from functools import cache
+from typing import Any
 
 import numpy as np
 
@@ -10,6 +11,7 @@ from ..accel import Intersections
 from ..arrays.state import Hits, Rays, SurfaceInteraction
 from ..arrays.vec import (
     ALL,
+    Doubles,
     Floats,
     Ints,
     Lanes,
@@ -46,6 +48,11 @@ class Surfaces:
         return Hits(found.t, found.prim, None, None)
 
     @classmethod
+    def moment(cls, rays: Rays) -> tuple[Doubles, ...]:
+        """Return what an accelerator is told of rays beside where they go: nothing."""
+        return ()
+
+    @classmethod
     def material_rows(cls, scene: CompiledScene, hits: Hits, lanes: Lanes) -> Ints:
         """Return the rows (k,) of the material table at some lanes of hits."""
         return scene.material_of.take(take(hits.prim, lanes))
@@ -64,7 +71,7 @@ class Surfaces:
         rows = self.material_rows(scene, hits, ALL)
         surface = SurfaceInteraction(point, error, front, ns, wo, self.prims(), rows, back_facing)
         for name, corners in scene.attributes.items():
-            values = _attribute(scene, name, corners, hits, point)
+            values = _attribute(scene, name, corners, hits, self.own_points(point))
             setattr(surface, name, self.vectors(values) if ATTRIBUTES[name].vectors else values)
         return surface
 
@@ -93,6 +100,10 @@ class Surfaces:
         """Return normals of vertices, 3 × (3, n), in the coordinates of the scene."""
         return corners
 
+    def own_points(self, point: Floats) -> Floats:
+        """Return points (3, n) in the coordinates in which curved primitives are in the scene's tables."""
+        return point
+
     def vectors(self, values: Floats) -> Floats:
         """Return vectors along the surfaces in the coordinates of the scene."""
         return values
@@ -102,6 +113,18 @@ class Surfaces:
 def surface_kind(parts: tuple[type[Surfaces], ...]) -> type[Surfaces]:
     """Return surfaces that are all of these, the first outermost."""
     return type("Surfaces", (*parts, Surfaces), {"__slots__": ()}) if parts else Surfaces
+
+
+def query(scene: CompiledScene, rays: Rays) -> tuple[Any, ...]:
+    """Return what an accelerator is asked for the nearest hits of rays with."""
+    moment = surface_kind(scene.program.surfaces).moment(rays)
+    return rays.origin, rays.direction, rays.exclude_prim, *moment
+
+
+def shadow_query(scene: CompiledScene, rays: Rays, length: Floats) -> tuple[Any, ...]:
+    """Return what an accelerator is asked with whether anything blocks rays over some lengths (n,)."""
+    moment = surface_kind(scene.program.surfaces).moment(rays)
+    return rays.origin, rays.direction, length, rays.exclude_prim, *moment
 
 
 def interaction(scene: CompiledScene, rays: Rays, hits: Hits) -> SurfaceInteraction:

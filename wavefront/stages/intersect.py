@@ -10,7 +10,7 @@ from ..arrays.vec import Bools, Floats, Ints, f4, positive, take
 from ..compile.scene import CompiledScene
 from ..lights import LightSample
 from ..sampling.steps import StepNumbers
-from .interaction import surface_kind
+from .interaction import query, shadow_query, surface_kind
 
 TARGET_ERROR = f4(2**-20)  # rounding of a sampled point on a light, relative to its distance
 
@@ -28,7 +28,7 @@ class ShadowRays(Rays):
 
 def intersect(scene: CompiledScene, rays: Rays) -> Hits:
     """Return the nearest hit of each ray."""
-    found = scene.accelerator.closest(rays.origin, rays.direction, rays.exclude_prim)
+    found = scene.accelerator.closest(*query(scene, rays))
     return surface_kind(scene.program.surfaces).hits_of(scene, found)
 
 
@@ -54,9 +54,7 @@ def shadow_rays(surface: SurfaceInteraction, origin: Floats, light: LightSample,
 
 def visible(scene: CompiledScene, rays: ShadowRays) -> Bools:
     """Return a mask (k,) of the shadow rays that nothing blocks."""
-    return ~scene.accelerator.occluded(
-        rays.origin, rays.direction, shadow_ray_length(rays), rays.exclude_prim
-    )
+    return ~scene.accelerator.occluded(*shadow_query(scene, rays, shadow_ray_length(rays)))
 
 
 def shadow_ray_length(rays: ShadowRays) -> Floats:

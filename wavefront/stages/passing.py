@@ -108,7 +108,7 @@ def covering_hits(scene: CompiledScene, rays: Rays) -> tuple[Rays, Hits]:
     if not veils:
         return rays, hits
     rays = replace(rays, origin=rays.origin.copy(), exclude_prim=rays.exclude_prim.copy())
-    rays.media = stacks_at(scene, rays.origin)
+    rays.media = stacks_at(scene, rays.origin, rays.time)
     lanes = np.flatnonzero(passable(scene, rays, hits, ALL, veils))
     while lanes.size:
         here = rays.take(lanes)

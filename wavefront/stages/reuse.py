@@ -489,8 +489,10 @@ def can_reuse(scene: CompiledScene) -> bool:
     """Return whether any path of a scene can be shared.
 
     Where surfaces with alpha and media are mixed none is: what gets through differs between channels then.
-    Nor is any where media scatter.
+    Nor is any where media scatter, or where something moves: each path meets the scene at a time of its own.
     """
+    if scene.motion is not None:
+        return False
     if scene.media is not None and not scene.media.only_absorbs:
         return False
     absorbs = scene.program.weaken or scene.program.dim

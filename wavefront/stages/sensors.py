@@ -124,6 +124,7 @@ def sensor_shading(scene: CompiledScene, paths: Paths) -> Shading:
         prim=paths.exclude_prim,
         material=np.zeros(n, np.intp),
         back_facing=broadcast(np.False_, n),
+        time=paths.time,
     )
     groups: list[tuple[Lanes, Bsdf]] = [(slice(0, n), paths.sensor)]
     up, kind = np.broadcast_to(UP, normal.shape), shading_kind(SensorShading, scene.program.shading)

@@ -230,7 +230,7 @@ def receiver_of(surface: SurfaceInteraction, groups: list[tuple[Lanes, Bsdf]]) -
         opaque = opaque.copy()
         for lanes, bsdf in groups:
             opaque[lanes] = not bsdf.transmissive
-    return Receiver(surface.ns, opaque)
+    return Receiver(surface.ns, opaque, time=surface.time)
 
 
 def _groups(materials: MaterialTable, surface: SurfaceInteraction) -> Iterator[tuple[Lanes, Bsdf]]:

@@ -13,7 +13,7 @@ from ..arrays.state import Hits, Rays, SurfaceInteraction
 from ..arrays.vec import ALL, Bools, Floats, Lanes, dot, f4, take
 from ..compile.program import Feature, Passage
 from ..compile.scene import CompiledScene
-from .interaction import interaction, offset_origin
+from .interaction import interaction, offset_origin, shadow_query
 from .intersect import ShadowRays, intersect, shadow_ray_length, visible
 
 AnyRays = TypeVar("AnyRays", bound=Rays)
@@ -74,9 +74,7 @@ def _blockers(scene: CompiledScene, rays: ShadowRays, veils: Veils) -> tuple[Boo
     """Return which rays (n,) no veil lets pass what they hit, and which others hit anything."""
     if not all(veil.spares_opaque for veil in veils):
         return np.zeros(len(rays), np.bool_), ~visible(scene, rays)
-    return surely_occluded(
-        scene.accelerator, rays.origin, rays.direction, shadow_ray_length(rays), rays.exclude_prim
-    )
+    return surely_occluded(scene.accelerator, *shadow_query(scene, rays, shadow_ray_length(rays)))
 
 
 def passable(scene: CompiledScene, rays: Rays, hits: Hits, lanes: Lanes, veils: Veils) -> Bools:

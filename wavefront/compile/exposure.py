@@ -1,0 +1,159 @@
+"""A scene in the middle of the time for which a shutter is open, and what of it moves meanwhile."""
+
+from __future__ import annotations
+
+from copy import copy
+from typing import Any
+
+import numpy as np
+
+from ..arrays.vec import Doubles
+from ..core.errors import SceneError
+from ..motion import Moving, Samples
+from ..motion.shutter import Shutter
+from ..motion.steps import Matrices
+from ..scene import Scene
+from ..shapes import Instance, Mesh, Shape, Spheres
+from ..shapes.transform import is_even
+from .motion import Exposed, Mover
+
+TIMES = 9  # while the shutter is open, at which it is looked where things are
+FORMS = 33  # of an emitting mesh whose transform does not keep its shape
+EVEN = 1e-5  # relative difference of scales along two axes that does not matter for light
+
+
+def exposed_scene(scene: Scene, shutter: Shutter | None) -> Exposed:
+    """Return a scene in the middle of the time for which a shutter is open, and what of it moves.
+
+    Without a shutter, or where nothing moves, it is the scene itself.
+
+    Raises
+    ------
+    SceneError
+        If something moves in a way that cannot be shown.
+    """
+    if shutter is None or not any(_moves(each, shutter) for each in (*scene.shapes, *scene.lights)):
+        return Exposed(scene)
+    still, (low, high) = copy(scene), scene.bounds
+    found, forms = Exposed(still, shutter, low=low, high=high), _Forms(shutter)
+    shapes = [shape.at(shutter.middle) for shape in scene.shapes]
+    for number, shape in enumerate(scene.shapes):
+        if _moves(shape, shutter):
+            shapes[number], found.movers[number] = forms.mover(shape, shapes[number])
+    still.shapes = shapes
+    still.lights = [light.at(shutter.middle) for light in scene.lights]
+    for number, light in enumerate(scene.lights):
+        if _moves(light, shutter):
+            found.lights[number] = _rigid(light, shutter)
+    return found
+
+
+def _moves(element: Moving, shutter: Shutter) -> bool:
+    """Return whether an element of a scene moves while a shutter is open."""
+    return element.moves and element.start < shutter.end and element.end > shutter.begin
+
+
+class _Forms:
+    """How shapes move, and what is traced of them; meshes that several instances share stay shared."""
+
+    def __init__(self, shutter: Shutter) -> None:
+        self._shutter, self._meshes = shutter, dict[int, tuple[Mesh, Mesh]]()  # with what they are of
+
+    def mover(self, shape: Shape, then: Shape) -> tuple[Shape, Mover]:
+        """Return what is traced of a shape, given what it is in the middle of the time, and how it moves."""
+        if isinstance(shape, Mesh):
+            return self._of_mesh(shape, then, shape, _matrices(shape))
+        if isinstance(shape, Instance):
+            assert isinstance(then, Instance)
+            if then.emission is not None and not self._keeps_shape(shape):
+                return self.mover(*self._as_forms(shape))
+            return self._of_mesh(shape, then, shape.mesh, _matrices(shape, shape.transform))
+        if shape.deformation is None:
+            return then, Mover(_matrices(shape))
+        if not isinstance(shape, Spheres):
+            raise SceneError(
+                f"{shape.name}: a {type(shape).__name__} that deforms while the shutter is open; only meshes "
+                "and wf.Spheres can"
+            )
+        return then, self._of_spheres(shape)
+
+    def _of_mesh(self, shape: Shape, then: Any, mesh: Mesh, matrices: Matrices) -> tuple[Shape, Mover]:
+        """Return the same of a mesh, or of an instance of one."""
+        middle = self._still(mesh)
+        if then.emission is not None:  # each emitting surface is a light of its own
+            middle = copy(middle)
+            middle.material, middle.emission = then.material, then.emission
+        traced = Instance(middle, matrices(np.array([self._shutter.middle]))[0], name=shape.name)
+        if then.material is not middle.material:
+            traced.material = then.material
+        if not mesh.moves:
+            return traced, Mover(matrices)
+        return traced, Mover(matrices, mesh, keys=_keys(mesh))
+
+    def _still(self, mesh: Mesh) -> Mesh:
+        """Return a mesh in the middle of the time, the same object for the same mesh."""
+        if id(mesh) not in self._meshes:
+            self._meshes[id(mesh)] = mesh.at(self._shutter.middle), mesh
+        return self._meshes[id(mesh)][0]
+
+    def _keeps_shape(self, shape: Instance) -> bool:
+        """Return whether the motion of an instance scales alike in all directions."""
+        times = np.linspace(self._shutter.begin, self._shutter.end, TIMES)
+        return is_even(_matrices(shape, shape.transform)(times), EVEN)
+
+    def _as_forms(self, shape: Instance) -> tuple[Mesh, Mesh]:
+        """Return an instance as a mesh that deforms, and that in the middle of the time."""
+        times = np.linspace(self._shutter.begin, self._shutter.end, FORMS)
+        meshes = [shape.at(time).to_mesh() for time in times.tolist()]
+        arrays = {"vertices": np.stack([mesh.vertices for mesh in meshes])}
+        if meshes[0].normals is not None:
+            arrays["normals"] = np.stack([mesh.normals for mesh in meshes])
+        mesh = copy(meshes[0])
+        mesh.deformation = Samples(times, arrays)
+        return mesh, mesh.at(self._shutter.middle)
+
+    def _of_spheres(self, shape: Spheres) -> Mover:
+        """Return how spheres move that have places of their own over time."""
+        assert shape.deformation is not None
+        matrices, deformation = _matrices(shape), shape.deformation
+        carried = matrices(np.array([self._shutter.middle]))[0]
+
+        def centers(time: float) -> Doubles:
+            places = deformation.at(time)["centers"]
+            return np.asarray(places @ carried[:3, :3].T + carried[:3, 3])
+
+        return Mover(matrices, centers=centers, keys=_keys(shape))
+
+
+def _matrices(shape: Moving, transform: Doubles | None = None) -> Matrices:
+    """Return the matrices of an element to the scene, at times."""
+    if shape.motion is not None:
+        return shape.motion.at_times
+    stays = np.eye(4) if transform is None else transform
+    return lambda times: np.repeat(stays[None], len(times), 0)
+
+
+def _keys(shape: Shape) -> Doubles:
+    """Return the times (n,) between which points of a shape that deforms go along lines."""
+    assert shape.deformation is not None
+    return np.unique(np.asarray(shape.deformation.keys, np.float64))
+
+
+def _rigid(light: Any, shutter: Shutter) -> Matrices:
+    """Return the matrices of a light.
+
+    Raises
+    ------
+    SceneError
+        If they stretch it while the shutter is open.
+    """
+    matrices = _matrices(light)
+    times = np.linspace(shutter.begin, shutter.end, TIMES)
+    back = np.linalg.inv(matrices(np.array([shutter.middle]))[0])
+    scales = np.linalg.svd((matrices(times) @ back)[:, :3, :3], compute_uv=False)
+    if np.abs(scales - 1).max() > EVEN:
+        raise SceneError(
+            f"{type(light).__name__}: its motion stretches by {scales.max():.6g} while the shutter is open; "
+            "a light can only go and turn then"
+        )
+    return matrices

@@ -1,0 +1,496 @@
+"""What moves of a scene while a shutter is open, and where it is at the time of a path.
+
+The arrays of a compiled scene hold it as it is in the middle of that time. What moves is an instance in them:
+each ray meets it by the matrix of its own time. A mesh that deforms has its corners at several times, as an
+instance that follows its middle.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import field
+from itertools import pairwise
+from typing import Any
+
+import numpy as np
+
+from ..accel import Accelerator, CurvedPrimitives, Geometry, InstanceAccelerator, Placements
+from ..accel.deforming import DeformingAccelerator, SweptSpheres, SweptTriangles
+from ..accel.moving import MovingInstances
+from ..accel.sphere import SpherePrimitives
+from ..arrays.soa import soa
+from ..arrays.state import Hits
+from ..arrays.vec import Bools, Doubles, Floats, Ints, f4
+from ..motion.shutter import Shutter
+from ..motion.steps import Matrices, Motions, step_at
+from ..scene import Scene
+from ..shapes import Instance, Mesh
+from .geometry import compute_corner_normals, compute_face_normals
+
+BOX_ROOM = 2.0**-17  # margin of boxes of what moves, relative to their size
+FAST = 4.0  # edges that corners of a deforming mesh may go within a step
+MOST_PARTS = 4  # into which such a step is divided
+IDENTITY = np.eye(4)
+
+
+@soa
+class Mover:
+    """How an instance moves."""
+
+    matrices: Matrices  # from times (n,), s, to matrices (n, 4, 4) to the scene
+    mesh: Mesh | None = None  # one that deforms; None where it is rigid
+    # of spheres that move by themselves: their centers (k, 3) at a time, as carried to the middle of the time
+    centers: Callable[[float], Doubles] | None = None
+    keys: Doubles = field(default_factory=lambda: np.zeros(0))  # (n,) times at which they turn, s
+
+
+@soa
+class Exposed:
+    """A scene in the middle of the time for which a shutter is open, and what of it moves."""
+
+    scene: Scene
+    shutter: Shutter | None = None  # None where nothing moves
+    movers: dict[int, Mover] = field(default_factory=dict)  # by the number of the shape
+    lights: dict[int, Matrices] = field(default_factory=dict)  # matrices, likewise
+    low: Doubles | None = None
+    high: Doubles | None = None
+
+    @property
+    def bounds(self) -> Doubles:
+        """Lower and upper corner (2, 3) of all places of the shapes."""
+        bounds = self.scene.bounds
+        if self.low is None or self.high is None:
+            return bounds
+        return np.stack([np.minimum(bounds[0], self.low), np.maximum(bounds[1], self.high)])
+
+
+@soa
+class DeformingRows:
+    """A mesh that deforms: its triangles at some times, in the coordinates in which it is traced."""
+
+    first: int  # row of its first triangle in the scene's tables
+    times: Doubles  # (steps + 1,) s
+    corners: list[Floats]  # for each of those times (m, 3, 3)
+    normals: list[tuple[Floats, Floats, Floats]] | None  # of vertices, 3 × (3, m); None where they have none
+
+    @property
+    def end(self) -> int:
+        """One past the row of its last triangle."""
+        return self.first + len(self.corners[0])
+
+    def swept(self) -> list[SweptTriangles]:
+        """Return the triangles, step by step."""
+        return [SweptTriangles(first, last) for first, last in pairwise(self.corners)]
+
+    @property
+    def box(self) -> tuple[Doubles, Doubles]:
+        """The corners (3,) of the box of all places."""
+        points = [each.reshape(-1, 3).astype(np.float64) for each in self.corners]
+        return np.min([each.min(0) for each in points], 0), np.max([each.max(0) for each in points], 0)
+
+    def face_normals(self, row: Ints, time: Doubles) -> Floats:
+        """Return the unit normals (3, n) of triangles, by their rows (n,), at times (n,)."""
+        step, part = step_at(self.times, time)
+        found = np.empty((3, row.size), f4)
+        for number in range(len(self.corners) - 1):
+            lanes = np.flatnonzero(step == number)
+            at = row.take(lanes) - self.first
+            before, after = (self.corners[number + side].take(at, 0).astype(np.float64) for side in (0, 1))
+            found[:, lanes] = compute_face_normals(
+                before + (after - before) * part.take(lanes)[:, None, None]
+            )
+        return found
+
+    def vertex_normals(self, row: Ints, time: Doubles) -> list[Floats]:
+        """Return the normals of vertices, 3 × (3, n), of triangles at times; not of unit length."""
+        assert self.normals is not None
+        step, part = step_at(self.times, time)
+        found = [np.empty((3, row.size), f4) for _ in range(3)]
+        for number in range(len(self.normals) - 1):
+            lanes = np.flatnonzero(step == number)
+            at, share = row.take(lanes) - self.first, part.take(lanes).astype(f4)
+            for corner, values in enumerate(found):
+                before, after = (self.normals[number + side][corner].take(at, 1) for side in (0, 1))
+                values[:, lanes] = before + (after - before) * share
+        return found
+
+
+@soa
+class CurvedRows:
+    """A curved shape that moves."""
+
+    first: int  # row of its first primitive in the scene's tables
+    kind: CurvedPrimitives  # in the middle of the time
+    times: Doubles  # (steps + 1,) s
+    centers: Floats | None = None  # (steps + 1, 3, k) of spheres that move by themselves; else None
+
+    def swept(self) -> list[SweptSpheres]:
+        """Return the spheres, step by step."""
+        assert self.centers is not None
+        assert isinstance(self.kind, SpherePrimitives)
+        return [SweptSpheres(first, last, self.kind.radii) for first, last in pairwise(self.centers)]
+
+    def ways(self, row: Ints, time: Doubles) -> Doubles:
+        """Return how far spheres, by rows (n,), are at times (n,) from where `kind` has them, (3, n)."""
+        assert self.centers is not None
+        assert isinstance(self.kind, SpherePrimitives)
+        (step, part), at = step_at(self.times, time), row - self.first
+        rows, count = self.centers.transpose(1, 0, 2).reshape(3, -1).astype(np.float64), len(self.kind)
+        before, after = rows.take(step * count + at, 1), rows.take((step + 1) * count + at, 1)
+        return np.asarray(before + (after - before) * part - self.kind.centers.take(at, 1))
+
+
+@soa
+class MotionTable:
+    """Where what moves is at a time."""
+
+    shutter: Shutter
+    motions: Motions | None  # of shapes; None where only lights move
+    mover: Ints  # (p,) the motion of each column of the `InstanceTable`, -1 for none
+    scale: Floats  # (p,) by which normals are multiplied, so that their lengths are at most 1
+    column_of_row: Ints  # (rows,) column of the `InstanceTable` of what moves, by the scene's tables; else 0
+    deformations: tuple[DeformingRows, ...]
+    curved: tuple[CurvedRows, ...]
+
+    def is_rigid(self, row: Ints) -> Bools:
+        """Return which rows (n,) of the scene's tables are of no mesh that deforms."""
+        rigid = np.ones(row.size, np.bool_)
+        for _, lanes in self.deformation_of(row):
+            rigid[lanes] = False
+        return rigid
+
+    def column_at(self, hits: Hits) -> Ints:
+        """Return the columns (n,) of the `InstanceTable` at hits; those that do not know find what moves."""
+        return self.column_of_row.take(hits.prim) if hits.instance is None else hits.instance
+
+    def deformation_of(self, row: Ints) -> list[tuple[DeformingRows, Ints]]:
+        """Return the meshes that deform among rows (n,) of the scene's tables, and the lanes of each."""
+        found = [(each, np.flatnonzero((row >= each.first) & (row < each.end))) for each in self.deformations]
+        return [(each, lanes) for each, lanes in found if lanes.size]
+
+
+def deforming_rows(mesh: Mesh, still: Mesh, first: int, shutter: Shutter, drift: Doubles) -> DeformingRows:
+    """Return the triangles of a mesh that deforms while a shutter is open.
+
+    Parameters
+    ----------
+    mesh, still
+        The mesh, and what it is in the middle of the time.
+    keys
+        (n,) s, times between which its vertices go along lines.
+    first
+        Row of its first triangle in the scene's tables.
+    drift
+        (3,) way of the middle of its vertices over the whole time, which is taken off.
+    """
+    times = _steps_of(mesh, keys, shutter)
+    middle = still.bounds.mean(0)
+    meshes = [mesh.at(time) for time in times.tolist()]
+    parts = (times - shutter.middle) / (shutter.end - shutter.begin)
+    corners = [
+        (each.vertices - middle - drift * part).take(mesh.faces, 0).astype(f4)
+        for each, part in zip(meshes, parts, strict=True)
+    ]
+    normals = None
+    if still.normals is not None:
+        flat = [compute_face_normals(each) for each in corners]
+        normals = [
+            compute_corner_normals([each], face) or (face,) * 3
+            for each, face in zip(meshes, flat, strict=True)
+        ]
+    return DeformingRows(first, times, corners, normals)
+
+
+def _times_of(keys: Doubles, shutter: Shutter) -> Doubles:
+    """Return keys (n,) s while a shutter is open, and when it opens and closes."""
+    inside = keys[(keys > shutter.begin) & (keys < shutter.end)]
+    return np.concatenate([[shutter.begin], inside, [shutter.end]])
+
+
+def _steps_of(mesh: Mesh, keys: Doubles, shutter: Shutter) -> Doubles:
+    """Return the times between which a mesh is traced as if its corners went along lines."""
+    times = _times_of(keys, shutter)
+    parts = [_parts_of(mesh, *step) for step in pairwise(times)]
+    steps = [
+        np.linspace(begin, end, count, endpoint=False)
+        for (begin, end), count in zip(pairwise(times), parts, strict=True)
+    ]
+    return np.concatenate([*steps, times[-1:]])
+
+
+def _parts_of(mesh: Mesh, begin: float, end: float) -> int:
+    """Return into how many parts a step is divided, so that boxes of triangles do not become too large."""
+    before, after = mesh.at(begin).vertices, mesh.at(end).vertices
+    way = after - before
+    way = np.linalg.norm(way - way.mean(0), axis=1).mean()
+    a, b, _ = before.take(mesh.faces, 0).transpose(1, 0, 2)
+    edge = np.linalg.norm(b - a, axis=1).mean()
+    return int(np.clip(np.ceil(way / max(FAST * edge, 1e-300)), 1, MOST_PARTS))
+
+
+def motion_table(
+    exposed: Exposed,
+    instances: Sequence[Instance],
+    kinds: Sequence[CurvedPrimitives],
+    numbers: Ints,
+    shared: Sequence[Mesh],
+    center: Doubles,
+    factor: float,
+    placements: Placements | None,
+    first_row: int,
+    rows_in_all: int,
+) -> MotionTable:
+    """Return where instances are at a time, and give `placements` boxes that hold all of these places.
+
+    Parameters
+    ----------
+    instances, kinds
+        Instances of meshes, in the middle of the time, and the primitives of curved shapes that move.
+    numbers
+        Those of shapes among those of the scene: the last ones are of `kinds`, and then of `instances`.
+    shared
+        The distinct meshes of the instances.
+    center
+        (3,) of the scene.
+    factor
+        By which the lengths of the scene are multiplied.
+    placements
+        Of the instances, and then of the curved shapes, in the middle of the time.
+    first_row, rows_in_all
+        Row of the first triangle of `shared` in the scene's tables, and their number of rows. The rows of
+        `kinds` are the last ones.
+    """
+    assert exposed.shutter is not None
+    found = _Found(np.zeros(rows_in_all, np.intp))
+    shutter, k = exposed.shutter, numbers.size - len(instances)
+    row_of = _first_rows(shared, first_row)
+    for instance, number in zip(instances, numbers[k:].tolist(), strict=True):
+        if number in exposed.movers:
+            unit = _unit_of(instance, exposed.scene.shapes[number])
+            moving, row = exposed.movers[number], row_of[id(instance.mesh)]
+            found.add_mesh(moving, instance.mesh, row, shutter, center, factor, unit)
+        else:
+            found.add_still()
+    row = rows_in_all - sum(map(len, kinds))
+    for kind, number in zip(kinds, numbers[k - len(kinds) : k].tolist(), strict=True):
+        found.add_curved(exposed.movers[number], kind, row, shutter, center, factor)
+        row += len(kind)
+    if placements is None or not found.matrices:
+        return MotionTable(shutter, None, np.full(2, -1), np.ones(2), found.column_of_row, (), ())
+    low, high = (np.stack(corners) for corners in zip(*found.boxes, strict=True))
+    reach = np.linalg.norm(np.maximum(np.abs(low), np.abs(high)), axis=1)
+    motions, mover = Motions.of(found.matrices, shutter.begin, shutter.end, reach), np.array(found.mover)
+    moves = np.flatnonzero(mover >= 0)
+    placements.low[:, moves], placements.high[:, moves] = _swept_boxes(motions, low, high)
+    longest = np.linalg.norm(placements.to_local.T.reshape(-1, 3, 4)[:, :, :3], 2, (1, 2))
+    return MotionTable(
+        shutter,
+        motions,
+        np.append([-1, -1], mover),
+        np.append([1, 1], 1 / longest),
+        found.column_of_row,
+        tuple(found.deforming.values()),
+        tuple(found.curved),
+    )
+
+
+class _Found:
+    """What has been found out of instances, in their order."""
+
+    def __init__(self, column_of_row: Ints) -> None:
+        self.column_of_row, self.mover = column_of_row, list[int]()
+        self.matrices, self.boxes = list[Matrices](), list[tuple[Doubles, Doubles]]()
+        self.deforming, self.curved = dict[int, DeformingRows](), list[CurvedRows]()
+
+    def add_still(self) -> None:
+        """Add an instance that does not move."""
+        self.mover.append(-1)
+
+    def add_mesh(
+        self,
+        moving: Mover,
+        mesh: Mesh,
+        row: int,
+        shutter: Shutter,
+        center: Doubles,
+        factor: float,
+        unit: float,
+    ) -> None:
+        """Add an instance of a mesh, whose first triangle has a row in the scene's tables."""
+        drift, box = np.zeros(3), _half_box(mesh)
+        if moving.mesh is not None:
+            whole = moving.mesh if factor == unit else moving.mesh.lengths_times(factor / unit)
+            drift = _drift(whole, shutter)
+            if id(mesh) not in self.deforming:
+                self.deforming[id(mesh)] = deforming_rows(whole, mesh, moving.keys, row, shutter, drift)
+            box = self.deforming[id(mesh)].box
+        traced = _traced(moving.matrices, mesh.bounds.mean(0), drift, shutter, center, factor, unit)
+        self._add(traced, box, row, len(mesh.faces))
+
+    def add_curved(
+        self,
+        moving: Mover,
+        kind: CurvedPrimitives,
+        row: int,
+        shutter: Shutter,
+        center: Doubles,
+        factor: float,
+    ) -> None:
+        """Add a curved shape, whose first primitive has a row in the scene's tables."""
+        found = CurvedRows(row, kind, np.array([shutter.begin, shutter.end]))
+        bounds = [kind.bounds]
+        if moving.centers is not None:
+            found.times = _times_of(moving.keys, shutter)
+            places = [moving.centers(time) * factor - center for time in found.times.tolist()]
+            found.centers = np.stack(places).transpose(0, 2, 1).astype(f4)
+            bounds = [each.bounds for each in found.swept()]
+        self.curved.append(found)
+        low, high = (np.concatenate([each[side] for each in bounds], 1).astype(np.float64) for side in (0, 1))
+        box = low.min(1), high.max(1)
+        self._add(_about(moving.matrices, shutter, center, factor), box, row, len(kind))
+
+    def _add(self, traced: Matrices, box: tuple[Doubles, Doubles], row: int, count: int) -> None:
+        self.mover.append(len(self.matrices))
+        self.matrices.append(traced)
+        self.boxes.append(box)
+        self.column_of_row[row : row + count] = len(self.mover) + 1
+
+
+def _first_rows(shared: Sequence[Mesh], first_row: int) -> dict[int, int]:
+    """Return the rows of the first triangles of meshes in the scene's tables, by their identities."""
+    sizes = [len(mesh.faces) for mesh in shared]
+    begins = first_row + np.cumsum([0, *sizes])[:-1]
+    return {id(mesh): begin for mesh, begin in zip(shared, begins.tolist(), strict=True)}
+
+
+def _unit_of(scaled: Instance, given: Any) -> float:
+    """Return by what the linear part of the transform of an instance was multiplied."""
+    return float(np.linalg.norm(scaled.transform[:3, :3]) / np.linalg.norm(given.transform[:3, :3]))
+
+
+def _drift(mesh: Mesh, shutter: Shutter) -> Doubles:
+    """Return the way (3,) of the middle of a mesh that deforms, while a shutter is open."""
+    return np.asarray(mesh.at(shutter.end).vertices.mean(0) - mesh.at(shutter.begin).vertices.mean(0))
+
+
+def _traced(
+    moving: Matrices,
+    middle: Doubles,
+    drift: Doubles,
+    shutter: Shutter,
+    center: Doubles,
+    factor: float,
+    unit: float,
+) -> Matrices:
+    """Return the matrices of an instance from the coordinates in which its mesh is traced."""
+
+    def matrices(times: Doubles) -> Doubles:
+        placed = moving(times).copy()
+        placed[:, :3, :3] *= unit
+        placed[:, :3, 3] = placed[:, :3, 3] * factor - center
+        parts = (times - shutter.middle) / (shutter.end - shutter.begin)
+        shift = middle + drift * parts[:, None]
+        placed[:, :3, 3] += (placed[:, :3, :3] * shift[:, None]).sum(2)
+        return placed
+
+    return matrices
+
+
+def _half_box(mesh: Mesh) -> tuple[Doubles, Doubles]:
+    """Return the corners (3,) of the box of a mesh, in the coordinates in which it is traced."""
+    half = np.ptp(mesh.bounds, axis=0) / 2
+    return -half, half
+
+
+def _swept_boxes(motions: Motions, low: Doubles, high: Doubles) -> tuple[Floats, Floats]:
+    """Return the corners (3, m) of boxes of what moves, with boxes (m, 3) of its own, at all times."""
+    lows, highs = [], []
+    to_local = motions.to_local.T.reshape(len(low), -1, 3, 4)
+    for own_low, own_high, matrix in zip(low, high, to_local, strict=True):
+        to_scene = np.linalg.inv(matrix[:, :, :3])
+        own_middle, half = (own_low + own_high) / 2, (own_high - own_low) / 2
+        middle = (to_scene * (own_middle - matrix[:, :, 3])[:, None]).sum(2)
+        reach = (np.abs(to_scene) * half).sum(2)
+        box = (middle - reach).min(0), (middle + reach).max(0)
+        room = BOX_ROOM * (np.abs(box).max() + np.ptp(box, axis=0).max())
+        lows.append(box[0] - room)
+        highs.append(box[1] + room)
+    return np.stack(lows, 1).astype(f4), np.stack(highs, 1).astype(f4)
+
+
+def place_accelerators(
+    single: Accelerator,
+    triangles: Sequence[Floats],
+    placements: Placements,
+    table: MotionTable | None,
+    first_row: int,
+    weights: bool,
+    make_accelerator: Callable[[Geometry], Accelerator],
+) -> InstanceAccelerator:
+    """Return the accelerator of a scene with instances, some of which may move.
+
+    Parameters
+    ----------
+    single
+        Of all that is not instanced.
+    triangles
+        (m, 3, 3) of each distinct mesh.
+    first_row
+        Row of the first of these in the scene's tables.
+    """
+    if table is None or table.motions is None:
+        built = [make_accelerator(Geometry(corners, (), weights)) for corners in triangles]
+        return InstanceAccelerator(single, built, placements)
+    deforming, row, meshes = {each.first: each for each in table.deformations}, first_row, list[Any]()
+    for corners in triangles:
+        if row in deforming:
+            each = deforming[row]
+            meshes.append(DeformingAccelerator(each.times, each.swept(), weights))
+        else:
+            meshes.append(make_accelerator(Geometry(corners, (), weights)))
+        row += len(corners)
+    nothing = np.zeros((0, 3, 3), f4)
+    for curved in table.curved:
+        if curved.centers is None:
+            meshes.append(make_accelerator(Geometry(nothing, (curved.kind,), weights)))
+        else:
+            meshes.append(DeformingAccelerator(curved.times, curved.swept(), weights))
+    return MovingInstances(single, meshes, placements, table.motions, table.mover[2:])
+
+
+def curved_that_move(numbers: Ints, curved: int, instances: int, exposed: Exposed) -> int:
+    """Return how many curved shapes move, given the `numbers` of meshes, `curved` shapes and `instances`."""
+    k = numbers.size - instances
+    return sum(number in exposed.movers for number in numbers[k - curved : k].tolist())
+
+
+def light_motions(
+    exposed: Exposed, center: Doubles, factor: float, reach: float
+) -> tuple[Motions | None, dict[int, int]]:
+    """Return how lights move from where they are in the middle of the time, and which by their numbers.
+
+    Parameters
+    ----------
+    center, factor
+        As for `motion_table`.
+    reach
+        Radius of the scene, times `factor`.
+    """
+    if not exposed.lights or exposed.shutter is None:
+        return None, {}
+    shutter = exposed.shutter
+    matrices = [_about(moving, shutter, center, factor) for moving in exposed.lights.values()]
+    motions = Motions.of(matrices, shutter.begin, shutter.end, np.full(len(matrices), reach))
+    return motions, {number: row for row, number in enumerate(exposed.lights)}
+
+
+def _about(moving: Matrices, shutter: Shutter, center: Doubles, factor: float) -> Matrices:
+    """Return the matrices of a motion from where things are in the middle of the time."""
+    back = np.linalg.inv(moving(np.array([shutter.middle]))[0])
+
+    def matrices(times: Doubles) -> Doubles:
+        moved: Doubles = moving(times) @ back
+        moved[:, :3, 3] = moved[:, :3, 3] * factor + (moved[:, :3, :3] * center).sum(2) - center
+        return moved
+
+    return matrices

@@ -1,0 +1,70 @@
+"""Lights that move while a shutter is open: the emitting surfaces and the other lights of a scene."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from ..arrays.vec import Floats, Ints
+from ..core.errors import SceneError
+from ..lights import InfiniteLight, Light, LightRecord
+from ..lights.moving import DeformingLights, MovingLights
+from ..motion.steps import Motions
+from .motion import DeformingRows, MotionTable
+
+
+def moving_light(light: Light, record: LightRecord, motions: Motions | None, number: int) -> MovingLights:
+    """Return a light, given by its record in the middle of the time, as it moves.
+
+    Raises
+    ------
+    SceneError
+        If it is one at infinity, or of a surface.
+    """
+    if isinstance(record, InfiniteLight) or light.shape is not None or motions is None:
+        raise SceneError(
+            f"{type(light).__name__} moves while the shutter is open; only lights at a place and shapes can"
+        )
+    return MovingLights(record, np.full(len(record), number), motions, type(record))
+
+
+def moving_parts(
+    record: LightRecord, rows: Ints | None, motion: MotionTable
+) -> Iterator[tuple[LightRecord, Ints | None]]:
+    """Yield emitting surfaces in parts: those that stand still, those that move, and meshes that deform.
+
+    Parameters
+    ----------
+    record, rows
+        k lights, and the rows (..., k) of their primitives in the scene's tables.
+    """
+    assert rows is not None
+    first = np.atleast_2d(rows)[0]
+    column = motion.column_of_row.take(first)
+    still = np.flatnonzero(column == 0)
+    if still.size == column.size:
+        yield record, rows
+        return
+    if still.size:
+        yield record.take(still), rows[..., still]
+    rigid = motion.is_rigid(first)
+    groups: list[tuple[DeformingRows | None, Ints]] = [(None, np.flatnonzero((column > 0) & rigid))]
+    groups += motion.deformation_of(first)
+    for deforming, lanes in groups:
+        if lanes.size:
+            part, row = record.take(lanes), first.take(lanes)
+            if deforming is not None:
+                part = _deforming(part, row, deforming)
+            assert motion.motions is not None
+            number = motion.mover.take(column.take(lanes))
+            yield MovingLights(part, number, motion.motions, type(part)), rows[..., lanes]
+
+
+def _deforming(record: LightRecord, row: Ints, mesh: DeformingRows) -> DeformingLights:
+    """Return emitting triangles of a mesh that deforms, by their rows (k,) in the scene's tables."""
+    corners: Floats = np.concatenate(
+        [each.take(row - mesh.first, 0).reshape(-1, 9).T for each in mesh.corners]
+    )
+    times = tuple(mesh.times.tolist())
+    return DeformingLights(record, np.ascontiguousarray(corners), times, type(record))

@@ -1,0 +1,151 @@
+"""Motions while a shutter is open: matrices at evenly spaced times, and between these by linear steps."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from typing import Self
+
+import numpy as np
+
+from ..arrays.soa import soa
+from ..arrays.vec import Doubles, Floats, Ints
+
+Matrices = Callable[[Doubles], Doubles]  # from times (n,) to matrices (n, 4, 4)
+
+ERROR = 2.0**-20  # of places, relative to the size of what is placed: what linear steps may leave out
+MOST_STEPS = 1 << 12
+MOST_MATRICES = 1 << 17  # of all motions; many motions have fewer steps
+
+
+@soa
+class Motions:
+    """m motions while a shutter is open, as matrices from the scene to what moves.
+
+    Between two of the evenly spaced times each matrix goes over to the next one linearly. A translation of
+    constant velocity is exact so, with one step.
+    """
+
+    begin: float  # when the shutter opens, s
+    seconds: float  # how long it is open
+    steps: int
+    to_local: Doubles  # (12, m * (steps + 1)) the (3, 4) matrices, row by row
+
+    @classmethod
+    def of(cls, motions: Sequence[Matrices], begin: float, end: float, reach: Doubles) -> Self:
+        """Return motions as tables of as many steps as they need.
+
+        Parameters
+        ----------
+        motions
+            For each of m, a function from times (n,) to matrices (n, 4, 4) to the scene.
+        reach
+            (m,) how far from the origin of its own coordinates each reaches.
+        """
+        steps = 1
+        while True:
+            times = np.linspace(begin, end, 4 * steps + 1)
+            placed = np.stack([motion(times)[:, :3] for motion in motions])
+            if (
+                steps >= min(MOST_STEPS, MOST_MATRICES // len(motions))
+                or _error_of_steps(placed, reach) <= ERROR
+            ):
+                break
+            steps *= 2
+        whole = np.zeros((len(motions), steps + 1, 4, 4))
+        whole[:, :, :3], whole[:, :, 3, 3] = placed[:, ::4], 1
+        inverse = np.linalg.inv(whole)[:, :, :3]
+        return cls(begin, end - begin, steps, np.ascontiguousarray(inverse.reshape(-1, 12).T))
+
+    def at(self, number: Ints, time: Doubles) -> Doubles:
+        """Return the (3, 4) matrices of some motions (n,) at times (n,), row by row, (12, n)."""
+        place = np.clip((time - self.begin) * (self.steps / self.seconds), 0, self.steps)
+        step = np.minimum(place.astype(np.intp), self.steps - 1)
+        part = place - step
+        row = number * (self.steps + 1) + step
+        before = self.to_local.take(row, 1)
+        after = self.to_local.take(row + 1, 1)
+        after -= before
+        after *= part
+        return np.add(before, after, out=after)
+
+    @property
+    def middle(self) -> float:
+        """The middle of the time for which the shutter is open."""
+        return self.begin + self.seconds / 2
+
+    def times(self, count: int) -> list[float]:
+        """Return times evenly spaced while the shutter is open, with both ends."""
+        found: list[float] = np.linspace(self.begin, self.begin + self.seconds, count).tolist()
+        return found
+
+
+def _error_of_steps(placed: Doubles, reach: Doubles) -> float:
+    """Return the error of linear steps over four of matrices (m, 4 k + 1, 3, 4), relative to what moves.
+
+    It is of places at most `reach` (m,) from the origins of their coordinates, in parts of the largest one or
+    of the way that it takes.
+    """
+    before, after = placed[:, :-1:4], placed[:, 4::4]
+    worst = np.zeros(len(placed))
+    for part in (1, 2, 3):
+        off = np.abs(placed[:, part::4] - (before + (after - before) * (part / 4)))
+        far = np.sqrt((off[..., :3] ** 2).sum((-1, -2))) * reach[:, None] + np.sqrt(
+            (off[..., 3] ** 2).sum(-1)
+        )
+        worst = np.maximum(worst, far.max(1))
+    size = np.sqrt((placed[..., :3] ** 2).sum((-1, -2))).max(1) * reach
+    size += np.ptp(placed[..., 3], axis=1).max(1)
+    return float((worst / np.where(size > 0, size, 1)).max())
+
+
+def applied(matrix: Doubles, points: Floats | Doubles) -> Doubles:
+    """Return points (3, n), each transformed by a (3, 4) matrix, given row by row, (12, n)."""
+    x, y, z = points
+    m = matrix
+    return np.stack([m[i] * x + m[i + 1] * y + m[i + 2] * z + m[i + 3] for i in (0, 4, 8)])
+
+
+def turned(matrix: Doubles, vectors: Floats | Doubles) -> Doubles:
+    """Return vectors (3, n), each transformed by the linear part of a (3, 4) matrix, (12, n)."""
+    x, y, z = vectors
+    m = matrix
+    return np.stack([m[i] * x + m[i + 1] * y + m[i + 2] * z for i in (0, 4, 8)])
+
+
+def transposed_turned(matrix: Doubles, vectors: Floats | Doubles) -> Doubles:
+    """Return vectors (3, n), each by the transposed linear part of a (3, 4) matrix, (12, n)."""
+    x, y, z = vectors
+    m = matrix
+    return np.stack([m[i] * x + m[i + 4] * y + m[i + 8] * z for i in (0, 1, 2)])
+
+
+def moved_back(matrix: Doubles, points: Floats | Doubles) -> Doubles:
+    """Return points (3, n), each by the inverse of a (3, 4) matrix, given row by row, (12, n)."""
+    away, inverse = points - matrix[3::4], inverse_linear(matrix)
+    return np.stack([(inverse[i : i + 3] * away).sum(0) for i in (0, 3, 6)])
+
+
+def inverse_linear(matrix: Doubles) -> Doubles:
+    """Return the inverses (9, n), row by row, of the linear parts of (3, 4) matrices (12, n)."""
+    a, b, c, _, d, e, f, _, g, h, i, _ = matrix
+    cofactors = np.stack(
+        [
+            e * i - f * h,
+            c * h - b * i,
+            b * f - c * e,
+            f * g - d * i,
+            a * i - c * g,
+            c * d - a * f,
+            d * h - e * g,
+            b * g - a * h,
+            a * e - b * d,
+        ]
+    )
+    return cofactors / (a * cofactors[0] + b * cofactors[3] + c * cofactors[6])
+
+
+def step_at(times: Doubles, time: Doubles) -> tuple[Ints, Doubles]:
+    """Return in which of the steps between `times` (k + 1,) others (n,) are, and after what part of these."""
+    step = np.clip(np.searchsorted(times, time, "right") - 1, 0, times.size - 2)
+    begin = times.take(step)
+    return step, np.clip((time - begin) / (times.take(step + 1) - begin), 0, 1)
