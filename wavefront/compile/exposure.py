@@ -18,6 +18,8 @@ from ..shapes.transform import is_even
 from .motion import Exposed, Mover
 
 TIMES = 9  # while the shutter is open, at which it is looked where things are
+MOST_STEPS = 16  # in which a deformation that is not given by lines is approximated by some
+STRAIGHT = 2.0**-12  # distance from such a line, relative to the shape, that does not matter
 FORMS = 33  # of an emitting mesh whose transform does not keep its shape
 EVEN = 1e-5  # relative difference of scales along two axes that does not matter for light
 
@@ -88,7 +90,7 @@ class _Forms:
             traced.material = then.material
         if not mesh.moves:
             return traced, Mover(matrices)
-        return traced, Mover(matrices, mesh, keys=_keys(mesh))
+        return traced, Mover(matrices, mesh, keys=_keys(mesh, "vertices", self._shutter))
 
     def _still(self, mesh: Mesh) -> Mesh:
         """Return a mesh in the middle of the time, the same object for the same mesh."""
@@ -122,7 +124,7 @@ class _Forms:
             places = deformation.at(time)["centers"]
             return np.asarray(places @ carried[:3, :3].T + carried[:3, 3])
 
-        return Mover(matrices, centers=centers, keys=_keys(shape))
+        return Mover(matrices, centers=centers, keys=_keys(shape, "centers", self._shutter))
 
 
 def _matrices(shape: Moving, transform: Doubles | None = None) -> Matrices:
@@ -133,10 +135,19 @@ def _matrices(shape: Moving, transform: Doubles | None = None) -> Matrices:
     return lambda times: np.repeat(stays[None], len(times), 0)
 
 
-def _keys(shape: Shape) -> Doubles:
-    """Return the times (n,) between which points of a shape that deforms go along lines."""
-    assert shape.deformation is not None
-    return np.unique(np.asarray(shape.deformation.keys, np.float64))
+def _keys(shape: Any, points: str, shutter: Shutter) -> Doubles:
+    """Return times (n,) between which the `points` of a shape that deforms go along lines, or nearly so."""
+    deformation = shape.deformation
+    if isinstance(deformation, Samples):
+        return deformation.times
+    steps = 1
+    while True:
+        times = np.linspace(shutter.begin, shutter.end, 2 * steps + 1)
+        forms = np.stack([deformation.at(time)[points] for time in times.tolist()])
+        off = np.abs(forms[1::2] - (forms[:-1:2] + forms[2::2]) / 2).max()
+        if steps >= MOST_STEPS or off <= STRAIGHT * np.ptp(forms, axis=(0, 1)).max():
+            return times[::2]
+        steps *= 2
 
 
 def _rigid(light: Any, shutter: Shutter) -> Matrices:

@@ -169,7 +169,7 @@ class MotionTable:
         return [(each, lanes) for each, lanes in found if lanes.size]
 
 
-def deforming_rows(mesh: Mesh, still: Mesh, first: int, shutter: Shutter, drift: Doubles) -> DeformingRows:
+def deforming_rows(mesh: Mesh, still: Mesh, keys: Doubles, first: int, shutter: Shutter, drift: Doubles) -> DeformingRows:
     """Return the triangles of a mesh that deforms while a shutter is open.
 
     Parameters

@@ -13,7 +13,7 @@ import numpy as np
 
 from ..arrays.soa import soa
 from ..arrays.state import SoA, SurfaceInteraction
-from ..arrays.vec import Doubles, Floats, Ints, cross, f4, length, normalize
+from ..arrays.vec import Doubles, Floats, Ints, cross, distinct, f4, length, normalize
 from ..motion.steps import Motions, applied, moved_back, step_at, transposed_turned, turned
 from .base import Emitters, LightRecord, LightSample, Receiver
 from .planar import PlanarLights
@@ -94,14 +94,15 @@ class MovingLights(LightRecord):
 
     def irradiance(self, center: Doubles, radius: float, scene_radius: float) -> Doubles:
         """Return the most that the lights bring at some times while the shutter is open, (c, k)."""
-        most = np.zeros((center.shape[1], len(self)))
-        for time in self.motions.times(TIMES):
-            for column, one in enumerate(self.number):
-                matrix = self.motions.at(np.full(center.shape[1], one), np.full(center.shape[1], time))
-                light = self.lights.take(np.array([column]))
+        most, cells = np.zeros((center.shape[1], len(self))), center.shape[1]
+        for number in distinct(self.number):
+            some = np.flatnonzero(self.number == number)
+            light = self.lights.take(some)
+            for time in self.motions.times(TIMES):
+                matrix = self.motions.at(np.full(cells, number), np.full(cells, time))
                 near = radius * float(_scale(matrix[:, :1])[0])
-                found = light.irradiance(applied(matrix, center), near, scene_radius)[:, 0]
-                np.maximum(most[:, column], found, out=most[:, column])
+                found = light.irradiance(applied(matrix, center), near, scene_radius)
+                most[:, some] = np.maximum(most[:, some], found)
         return most
 
     def emitters(self) -> Emitters | None:
