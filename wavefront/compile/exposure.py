@@ -36,8 +36,10 @@ def exposed_scene(scene: Scene, shutter: Shutter | None) -> Exposed:
     """
     if shutter is None or not any(_moves(each, shutter) for each in (*scene.shapes, *scene.lights)):
         return Exposed(scene)
-    still, (low, high) = copy(scene), scene.bounds
-    found, forms = Exposed(still, shutter, low=low, high=high), _Forms(shutter)
+    still, moving = copy(scene), [shape for shape in scene.shapes if _moves(shape, shutter)]
+    times = np.linspace(shutter.begin, shutter.end, TIMES).tolist()
+    boxes = [Scene([shape.at(time) for shape in moving]).bounds for time in times if moving]
+    found, forms = Exposed(still, shutter, boxes=tuple(boxes)), _Forms(shutter)
     shapes = [shape.at(shutter.middle) for shape in scene.shapes]
     for number, shape in enumerate(scene.shapes):
         if _moves(shape, shutter):
@@ -52,7 +54,8 @@ def exposed_scene(scene: Scene, shutter: Shutter | None) -> Exposed:
 
 def _moves(element: Moving, shutter: Shutter) -> bool:
     """Return whether an element of a scene moves while a shutter is open."""
-    return element.moves and element.start < shutter.end and element.end > shutter.begin
+    start, end = element.time_span
+    return element.moves and start < shutter.end and end > shutter.begin
 
 
 class _Forms:

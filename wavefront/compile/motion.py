@@ -52,16 +52,13 @@ class Exposed:
     shutter: Shutter | None = None  # None where nothing moves
     movers: dict[int, Mover] = field(default_factory=dict)  # by the number of the shape
     lights: dict[int, Matrices] = field(default_factory=dict)  # matrices, likewise
-    low: Doubles | None = None
-    high: Doubles | None = None
+    boxes: tuple[Doubles, ...] = ()  # (2, 3) each, the corners of what moves at some times
 
     @property
     def bounds(self) -> Doubles:
         """Lower and upper corner (2, 3) of all places of the shapes."""
-        bounds = self.scene.bounds
-        if self.low is None or self.high is None:
-            return bounds
-        return np.stack([np.minimum(bounds[0], self.low), np.maximum(bounds[1], self.high)])
+        low, high = zip(self.scene.bounds, *self.boxes, strict=True)
+        return np.stack([np.min(low, 0), np.max(high, 0)])
 
 
 @soa
@@ -169,7 +166,9 @@ class MotionTable:
         return [(each, lanes) for each, lanes in found if lanes.size]
 
 
-def deforming_rows(mesh: Mesh, still: Mesh, keys: Doubles, first: int, shutter: Shutter, drift: Doubles) -> DeformingRows:
+def deforming_rows(
+    mesh: Mesh, still: Mesh, keys: Doubles, first: int, shutter: Shutter, drift: Doubles
+) -> DeformingRows:
     """Return the triangles of a mesh that deforms while a shutter is open.
 
     Parameters

@@ -20,6 +20,7 @@ from ..shapes import Shape
 from ..shapes.attributes import Corners, corner_values
 from .absorption import absorbs_alone
 from .curved import CurvedTable
+from .exposure import exposed_scene
 from .geometry import compute_corner_normals, gather_triangles, same_as_next
 from .instances import InstanceTable, own_frame, place_instances, sort_shapes
 from .light_groups import BY_DEFAULT, LightGroups
@@ -34,7 +35,6 @@ from .materials import (
 )
 from .media import MediaTable, glow_lights, media_of, media_table, phase_materials
 from .morton import AnyOrder, MortonGrid
-from .exposure import exposed_scene
 from .motion import MotionTable, curved_that_move, light_motions, motion_table, place_accelerators
 from .moving_curved import with_curved
 from .program import Facts, Program

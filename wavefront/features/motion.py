@@ -230,3 +230,33 @@ class Exposure(Feature):
         matrix = self.motions.at(np.zeros(time.size, np.intp), time)
         start = transposed_turned(matrix, origin - matrix[3::4]).astype(f4)
         return start, normalize(transposed_turned(matrix, direction)).astype(f4)
+
+
+def motions_of_camera(camera: Camera, shutter: Shutter, center: Doubles, factor: float) -> Motions:
+    """Return how a camera moves from where its origin and rotation have it.
+
+    Parameters
+    ----------
+    center, factor
+        (3,) of the scene, and by what its lengths are multiplied.
+    """
+    assert camera.motion is not None
+    motion, back = camera.motion, np.linalg.inv(camera.to_matrix())
+
+    def matrices(times: Doubles) -> Doubles:
+        moved = upright(motion.at_times(times)) @ back
+        moved[:, :3, 3] = moved[:, :3, 3] * factor + (moved[:, :3, :3] * center).sum(2) - center
+        return moved
+
+    return Motions.of([matrices], shutter.begin, shutter.end, np.ones(1))
+
+
+def upright(matrices: Doubles) -> Doubles:
+    """Return matrices (n, 4, 4) of cameras without their scales, as `Camera.at` has them."""
+    found = matrices.copy()
+    backward, up = found[:, :3, 2], found[:, :3, 1]
+    backward = backward / np.linalg.norm(backward, axis=1, keepdims=True)
+    right = np.cross(up, backward)
+    right /= np.linalg.norm(right, axis=1, keepdims=True)
+    found[:, :3, 0], found[:, :3, 1], found[:, :3, 2] = right, np.cross(backward, right), backward
+    return found

@@ -10,7 +10,7 @@ from ..guiding import GuideTable
 from ..motion.shutter import Shutter
 from .branches import Branches
 from .guide import Guide
-from .motion import Exposure
+from .motion import Exposure, motions_of_camera
 
 
 def seen_by(scene: CompiledScene, camera: Camera, shutter: Shutter | None) -> CompiledScene:
@@ -18,7 +18,8 @@ def seen_by(scene: CompiledScene, camera: Camera, shutter: Shutter | None) -> Co
     scene = scene.seen_by(camera)
     if shutter is None or not (scene.motion is not None or camera.moves):
         return scene
-    return replace(scene, program=scene.program.plus(Exposure(shutter)))
+    motions = motions_of_camera(camera, shutter, scene.center, scene.scale) if camera.moves else None
+    return replace(scene, program=scene.program.plus(Exposure(shutter, motions)))
 
 
 def seen_with(scene: CompiledScene, table: GuideTable | None = None, branches: int = 1) -> CompiledScene:

@@ -39,6 +39,7 @@ class Samples(Deformation):
 
     def __init__(self, times: Doubles, arrays: Mapping[str, Doubles]) -> None:
         self._tracks = {name: Track(times, values) for name, values in arrays.items()}
+        self.times = times
         self.start, self.end = float(times[0]), float(times[-1])
 
     def at(self, time: float) -> Mapping[str, Doubles]:
