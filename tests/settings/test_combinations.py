@@ -15,7 +15,7 @@ import wavefront as wf
 from wavefront.drive import choice
 from wavefront.sampling import tiles
 from wavefront.settings import SETTINGS
-from wavefront.settings.checks import EXCLUSIONS, MEDIA, SETTING_OF, Exclusion, table
+from wavefront.settings.checks import EXCLUSIONS, MEDIA, MOVING, SETTING_OF, Exclusion, table
 
 CAMERA = wf.Camera.look_at((3, 2, 4), (0, 0, 0), fov=45, size=(8, 8))
 ANOTHER = "another integrator"
@@ -47,6 +47,8 @@ VALUES: dict[str, Any] = {  # of each setting, one that is not its default
     "noise": 0.9,
     "quality": "reference",
     "seconds": 0.05,
+    "shutter": (0.0, 1.0),
+    "shutter_curve": "triangle",
     "filter": "tent",
     "light_sampler": "power",
     "branches": 2,
@@ -65,7 +67,9 @@ VALUES: dict[str, Any] = {  # of each setting, one that is not its default
     "progress": lambda done, total: None,
 }
 USUAL = {"size": (8, 8), "max_bounces": 4, "lighting": "cloudy", "workers": 1, "progress": False}
-OF_SETTINGS = [each for each in EXCLUSIONS if each.other != MEDIA]  # tests/media has those of scenes
+OF_SETTINGS = [
+    each for each in EXCLUSIONS if each.other not in (MEDIA, MOVING)
+]  # tests/media has those of scenes
 NAMED = {name for each in EXCLUSIONS for name in (each.one, each.other)}
 QUICK = [name for name in VALUES if name in NAMED and name not in ("guide", "material")]
 

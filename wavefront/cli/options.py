@@ -87,6 +87,12 @@ def samples(text: str) -> range:
     return range(first, end)
 
 
+def shutter(text: str) -> tuple[float, float]:
+    """Return OPEN:CLOSE as two times."""
+    begin, end = _parts(text, ":", float, 2, f"{text!r} is not OPEN:CLOSE, such as 0.48:0.52")
+    return begin, end
+
+
 def fov(text: str) -> float:
     """Return an angle between 0 and 180 degrees."""
     fov = _finite(text)
@@ -218,6 +224,7 @@ READERS: dict[str, tuple[Callable[[str], Any], str | None]] = {
     "background": (background, "COLOR"),
     "roulette": (roulette_after, "EVENTS"),
     "samples": (samples, "FIRST:END"),
+    "shutter": (shutter, "OPEN:CLOSE"),
     "branches": (branches, None),
     "reuse": (reuse, None),
 }

@@ -26,7 +26,7 @@ from ..media import Medium
 from ..scene import Scene
 from ..scene.lighting import DEFAULT, choose_ground, choose_preset, is_above, lighted
 from ..settings import AUTO, Settings
-from ..settings.checks import MEDIA, check_combinations
+from ..settings.checks import MEDIA, MOVING, check_combinations
 
 
 class PreparedScene:
@@ -72,8 +72,8 @@ class PreparedScene:
         _warn_of_light_in_endless_fog(self.lighted)
         with phase("building the scene", settings.values["progress"]):
             compiled = self._compile(settings)
-        if compiled.media is not None and not compiled.media.only_absorbs:
-            check_combinations({**settings.values, MEDIA: True})
+        scatters = compiled.media is not None and not compiled.media.only_absorbs
+        check_combinations({**settings.values, MEDIA: scatters, MOVING: compiled.motion is not None})
         self.compiled = replace(compiled, roulette_after=settings.roulette_after)
         self.shapes = ShapeTable(self.lighted.shapes)
 

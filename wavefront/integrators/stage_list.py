@@ -19,7 +19,7 @@ from ..stages.shade import direct, emitted, mis_weighted, shading
 
 # Stages in the order in which they run, and the points of features after each.
 ORDER: tuple[tuple[Callable[..., Any], tuple[str, ...]], ...] = (
-    (generate, ("begin",)),
+    (generate, ("expose", "begin")),
     (intersect, ("surfaces", "passable", "walk", "fly")),
     (emitted, ("meet",)),
     (mis_weighted, ()),

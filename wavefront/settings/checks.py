@@ -196,6 +196,7 @@ ONE_PATH = "light of shared paths comes from many paths at once"
 ANY_PIXEL = "paths from lights reach any pixel"
 ONLY_FULL = "only the paths of integrator='full' go on from surface to surface with light samples"
 MEDIA = "media that scatter"  # or emit, or vary: known of a scene once it is compiled
+MOVING = "shapes or lights that move while the shutter is open"  # likewise
 GIVEN = "samples are given by their numbers"
 EXCLUSIONS = (
     Exclusion("reuse", "clamp", f"a clamp limits what one path finds, and {ONE_PATH}"),
@@ -211,6 +212,7 @@ EXCLUSIONS = (
     Exclusion("branches", "another integrator", ONLY_FULL),
     Exclusion("reuse", MEDIA, "points within media are not shared"),
     Exclusion("caustics", MEDIA, "paths from lights do not follow them"),
+    Exclusion("reuse", MOVING, "each path meets the scene at a time of its own"),
     Exclusion("view", "camera", "a view is framed by a camera of its own"),
     Exclusion("fov", "camera", "a camera has a field of view of its own"),
     Exclusion("scalars", "material", "both say what the surface looks like"),
@@ -227,6 +229,7 @@ ASKED: dict[str, Callable[[Mapping[str, Any]], bool]] = {
     "branches": lambda values: values["branches"] not in (1, AUTO),
     "features": lambda values: bool(values["features"]),
     MEDIA: lambda values: bool(values.get(MEDIA)),
+    MOVING: lambda values: bool(values.get(MOVING)),
     "filter": lambda values: FILTERS.find(values["filter"]) is not box,
     "light groups": lambda values: "light_groups" in values["aovs"],
     "another integrator": lambda values: INTEGRATORS.find(values["integrator"]) is not li_full,
@@ -272,7 +275,7 @@ def _both_ways() -> Iterator[Exclusion]:
 
 
 def _in_words(values: Mapping[str, Any], name: str) -> str:
-    if name == MEDIA:
+    if name in (MEDIA, MOVING):
         return name
     setting = SETTING_OF.get(name, name)
     return f"{setting}={in_brief(SHOWN.get(setting, lambda value: value)(values[setting]))}"

@@ -381,7 +381,7 @@ class RenderSettings(TypedDict, total=False):
             None,
             "When the shutter is open, (from, until) in seconds of the scene: what moves is blurred. None "
             "shows one moment.",
-            option="FROM,UNTIL in seconds of the scene: what moves while the shutter is open is blurred",
+            option="OPEN:CLOSE in seconds of the scene, such as 0.48:0.52: what moves meanwhile is blurred",
             check=check_shutter,
             identity=True,
         ),

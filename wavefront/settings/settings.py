@@ -128,7 +128,7 @@ class Settings:
         """Return the settings that renders of the same samples have in common; functions by their names."""
         given: Any = self.values
         return {
-            name: given[name] if each.choices is None else each.choices.label(given[name])
+            name: _as_in_files(given[name]) if each.choices is None else each.choices.label(given[name])
             for name, each in SETTINGS.items()
             if each.identity
         }
@@ -216,3 +216,8 @@ class Settings:
         if samples.stop > most:
             raise SceneError(f"samples is {samples!r}; it must end at {most} at most")
         return len(samples)
+
+
+def _as_in_files(value: Any) -> Any:
+    """Return a value as it is read from a file: a tuple as a list."""
+    return list(value) if isinstance(value, tuple) else value

@@ -1,0 +1,236 @@
+"""Motion blur: pictures of an open shutter are means of pictures of its moments, and closed forms."""
+
+from itertools import pairwise
+
+import numpy as np
+import pytest
+from scipy import integrate, stats
+from significance import ALPHA, render, smallest_p
+
+import wavefront as wf
+
+OPTIONS = {"ground": False, "lighting": None, "branches": 1, "reuse": False}
+
+
+def placed(shift=(0, 0, 0), degrees=0.0, axis=1):
+    """A turn about an axis, and then a shift, as a matrix (4, 4)."""
+    turn, (i, j) = np.radians(degrees), [each for each in range(3) if each != axis]
+    matrix = np.eye(4)
+    matrix[i, i] = matrix[j, j] = np.cos(turn)
+    matrix[i, j], matrix[j, i] = np.sin(turn), -np.sin(turn)
+    matrix[:3, 3] = shift
+    return matrix
+
+
+SLIDE = wf.Keyframes([0, 1], [placed(), placed((1, 0, 0))])
+TURN = wf.Keyframes([0, 0.4, 1], [placed(), placed((0.5, 0.2, 0), 60), placed((1.5, 0, 0.5), 170)])
+
+
+def view(size=16, **changes):
+    return wf.Camera.look_at(**{"origin": (0, 2, 6), "target": (0, 0, 0), "fov": 40, "size": size, **changes})
+
+
+def blob(rings=12):
+    """A mesh that deforms: vertices (3, n, 3) at three times, and faces."""
+    polar, around = np.linspace(0.01, np.pi - 0.01, rings), np.linspace(0, 2 * np.pi, 2 * rings)
+    p, a = (each.ravel() for each in np.meshgrid(polar, around, indexing="ij"))
+    v = 0.6 * np.stack([np.sin(p) * np.cos(a), np.cos(p), np.sin(p) * np.sin(a)], 1)
+    row, column = (x.ravel() for x in np.indices((rings - 1, 2 * rings - 1)))
+    first = row * 2 * rings + column
+    next_row = first + 2 * rings
+    faces = [
+        np.stack(each, 1) for each in ((first, first + 1, next_row), (first + 1, next_row + 1, next_row))
+    ]
+    return np.stack([v, v * (1, 0.6, 1) + (0.4, 0, 0), v * (0.8, 1.3, 0.8) + (1.2, 0.2, 0)]), np.concatenate(
+        faces
+    )
+
+
+def strata_means(scene, strata, spp, seed, **options):
+    """The mean of stills at one random time in each of some strata of [0, 1], all with their own seeds."""
+    times = (np.arange(strata) + np.random.default_rng(seed).random(strata)) / strata
+    stills = [
+        render(scene.at(time), spp, seed=1000 * seed + number + 1, **options).rgb.astype(float)
+        for number, time in enumerate(times.tolist())
+    ]
+    return np.mean(stills, 0)
+
+
+def assert_mean_of_stills(scene, runs=8, strata=8, spp=16, still_spp=2, max_error=0.02, **options):
+    """Test that blurred pictures and means of stills have the same mean in blocks and over all."""
+    options = {**OPTIONS, **options}
+    blurred = np.stack(
+        [render(scene, spp, seed=run, shutter=(0, 1), **options).rgb.astype(float) for run in range(runs)]
+    )
+    stills = np.stack([strata_means(scene, strata, still_spp, run + 1, **options) for run in range(runs)])
+    side = blurred.shape[1] // 4
+    cells = [each.reshape(runs, 4, side, 4, side, 3).mean((2, 4)) for each in (blurred, stills)]
+    for level in (cells, [each.mean((1, 2)) for each in cells]):
+        assert smallest_p(*level) > ALPHA
+    error = np.sqrt(sum(each.mean((1, 2, 3)).var(ddof=1) / runs for each in cells))
+    assert error < max_error * stills.mean()
+
+
+def floor():
+    return wf.Rectangle((-3, -0.6, 3), (6, 0, 0), (0, 0, -6), material=wf.Diffuse(0.6))
+
+
+def lights():
+    return [wf.PointLight((1, 4, 2), 60), wf.Environment(0.3)]
+
+
+def scenes():
+    """Scenes in which something moves from 0 to 1 s, by name."""
+    box = wf.Box((0, 0, 0), 0.8, material=wf.Diffuse((0.3, 0.7, 0.2)))
+    ball = wf.Sphere((0, 0, 0), 0.5, material=wf.Diffuse((0.7, 0.3, 0.2)))
+    vertices, faces = blob()
+    lamp = wf.Rectangle((-0.4, 1.2, -0.4), (0.8, 0, 0), (0, 0, 0.8), emission=8)
+    many = np.array([[(0, 0, 0), (-1, 0.3, 0)], [(1, 0, 0), (-1, 0.3, 1)]])
+    moving = view().transformed(wf.Keyframes([0, 1], [np.eye(4), placed((0.3, -0.1, -0.2), 4)]))
+    spot = wf.SpotLight((0, 3, 0), 50, direction=(0, -1, 0.2))
+    return {
+        "instance": wf.Scene([floor(), box.transformed(TURN)], lights(), view()),
+        "sphere": wf.Scene([floor(), ball.transformed(TURN)], lights(), view()),
+        "deforming": wf.Scene([floor(), wf.Mesh(vertices, faces, times=[0, 0.3, 1])], lights(), view()),
+        "smooth": wf.Scene(
+            [floor(), wf.Mesh(vertices, faces, times=[0, 0.3, 1], smooth=True).transformed(SLIDE)],
+            lights(),
+            view(),
+        ),
+        "spheres": wf.Scene(
+            [floor(), wf.Spheres(many, 0.4, times=[0, 1]).transformed(TURN)], lights(), view()
+        ),
+        "point": wf.Scene([floor(), box], [wf.PointLight((-1.5, 1.5, 0.5), 10).transformed(TURN)], view()),
+        "spot": wf.Scene([floor(), box], [spot.transformed(TURN)], view()),
+        "lamp": wf.Scene([floor(), ball, lamp.transformed(TURN)], [], view()),
+        "bulb": wf.Scene([floor(), box, wf.Sphere((0, 1, 0), 0.3, emission=9).transformed(TURN)], [], view()),
+        "glowing blob": wf.Scene(
+            [floor(), wf.Mesh(vertices + np.array([0, 0.6, 0]), faces, times=[0, 0.3, 1], emission=2)],
+            [],
+            view(),
+        ),
+        "camera": wf.Scene([floor(), box, ball.translated((1, 0, 0))], lights(), moving),
+    }
+
+
+SCENES = scenes()
+
+
+@pytest.mark.parametrize("name", ["instance", "deforming", "camera", "lamp"])
+def test_blurred_picture_is_the_mean_of_stills(name):
+    assert_mean_of_stills(SCENES[name], runs=4, strata=4, spp=8)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("accel", ["numpy", "embree"])
+@pytest.mark.parametrize("name", SCENES)
+def test_blurred_pictures_are_means_of_stills(name, accel):
+    assert_mean_of_stills(SCENES[name], runs=16, strata=64, spp=128, accel=accel)
+
+
+def coverage(edges, width, way):
+    """What a bar of a width, which goes a way at constant speed from 0, covers between edges (k + 1,)."""
+
+    def covered(x):
+        """The part of the time for which the bar is over x: a trapezoid."""
+        return max(min(x, way) - max(x - width, 0), 0) / way
+
+    kinks = [0, width, way, width + way]
+    return [
+        integrate.quad(covered, a, b, points=[x for x in kinks if a < x < b] or None)[0] / (b - a)
+        for a, b in pairwise(edges)
+    ]
+
+
+def columns_of_alpha(shape, width, samples=128, **options):
+    """The mean alpha of columns of pixels that see a shape from above, and its standard errors at most."""
+    camera = wf.Camera.orthographic((0, 0, 5), (0, 0, 0), height=width * 4, size=(16, 64))
+    image = render(wf.Scene([shape], wf.Environment(1), camera), samples, aovs="alpha", **OPTIONS, **options)
+    alpha = image.layers["alpha"].astype(float).reshape(64, 16)
+    return alpha.mean(0), alpha.std(0, ddof=1) / 8
+
+
+def assert_columns(found, expected):
+    """Test the means of columns against exact ones."""
+    mean, error = found
+    assert error.max() < 0.006
+    off = np.abs(mean - expected)
+    assert (off <= stats.t.ppf(1 - ALPHA / 2 / 16, 63) * error + 1e-4).all(), (mean, expected, error)
+
+
+def test_alpha_of_a_bar_that_crosses_pixels_is_a_trapezoid():
+    bar = wf.Rectangle((0, -99, 0), (1.1, 0, 0), (0, 198, 0))
+    slide = wf.Keyframes([2, 4], [placed((-3, 0, 0)), placed((0.7, 0, 0))])
+    found = columns_of_alpha(bar.transformed(slide), 8, shutter=(2, 4))
+    assert_columns(found, coverage(np.linspace(-1, 7, 17), 1.1, 3.7))
+
+
+def test_alpha_of_a_disk_that_crosses_pixels_is_a_trapezoid():
+    """The disk of a sphere, seen by parallel rays, is at each height a bar as wide as the chord there."""
+    camera = wf.Camera.orthographic((0, 0.3, 5), (0, 0.3, 0), height=0.25, size=(16, 1))
+    slide = wf.Keyframes([0, 1], [placed((-1.3, 0, 0)), placed((0.4, 0, 0))])
+    scene = wf.Scene([wf.Sphere((0, 0, 0), 0.5).transformed(slide)], wf.Environment(1), camera)
+    runs = np.stack(
+        [
+            render(scene, 64, shutter=(0, 1), aovs="alpha", seed=seed, **OPTIONS).layers["alpha"].ravel()
+            for seed in range(64)
+        ]
+    ).astype(float)
+    heights = 0.3 + (np.arange(64) + 0.5) / 256 - 0.125
+    chords = 2 * np.sqrt(0.25 - heights**2)
+    edges = np.linspace(-2, 2, 17) + 1.3
+    expected = np.mean([coverage(edges + chord / 2, chord, 1.7) for chord in chords], 0)
+    assert_columns((runs.mean(0), runs.std(0, ddof=1) / 8), expected)
+
+
+def test_shutter_curve_weighs_times():
+    bar = wf.Rectangle((-24, -99, 0), (20, 0, 0), (0, 198, 0))  # its edge crosses the picture
+    slide = wf.Keyframes([0, 1], [placed(), placed((8, 0, 0))])
+    found = columns_of_alpha(bar.transformed(slide), 8, shutter=(0, 1), shutter_curve="triangle")
+    until = [2 * u * u if u < 0.5 else 1 - 2 * (1 - u) ** 2 for u in np.linspace(0, 1, 1601)]
+    # the edge comes to u at the time u: the mean over a pixel of the part of the light after that
+    cells = (np.add.accumulate(until) - 0.5 * np.array(until))[::100] / 1600
+    assert_columns(found, 1 - np.diff(cells) * 16)
+
+
+# --- What does not change ----------------------------------------------------------------------------
+
+
+def test_still_scene_pays_nothing_for_a_shutter():
+    box, fall = wf.Box((0, 0, 0), 0.8), wf.Keyframes([2, 3], [placed(), placed((0, 1, 0))])
+    for shape in (box, box.transformed(fall)):  # the latter moves when the shutter is closed
+        scene = wf.Scene([floor(), shape], lights(), view())
+        expected = render(scene, 2, **OPTIONS).rgb
+        assert np.array_equal(render(scene, 2, shutter=(0, 1), **OPTIONS).rgb, expected)
+    assert "Exposure" not in str(wf.program(wf.Scene([floor(), box], lights(), view()), shutter=(0, 1)))
+
+
+@pytest.mark.parametrize("name", ["instance", "deforming", "camera"])
+def test_same_bits_for_any_waves(name):
+    scene = SCENES[name]
+    expected = render(scene, 4, shutter=(0, 1), **OPTIONS).rgb
+    for changes in ({"wave_size": 100}, {"workers": 2, "executor": "threads", "wave_size": 300}):
+        assert np.array_equal(render(scene, 4, shutter=(0, 1), **OPTIONS, **changes).rgb, expected)
+
+
+def test_checkpoint_goes_on_with_the_same_bits(tmp_path):
+    scene, path = SCENES["lamp"], tmp_path / "blur.wfck"
+    whole = render(scene, 8, shutter=(0, 1), **OPTIONS).rgb
+    render(scene, 3, shutter=(0, 1), checkpoint=path, **OPTIONS)
+    assert np.array_equal(render(scene, 8, shutter=(0, 1), checkpoint=path, **OPTIONS).rgb, whole)
+    with pytest.raises(wf.SceneError, match="shutter was"):
+        render(scene, 9, shutter=(0, 0.5), checkpoint=path, **OPTIONS)
+
+
+@pytest.mark.parametrize("shutter", [(1, 1), (2, 1), (0,), (0, np.inf), 3])
+def test_malformed_shutter_is_refused(shutter):
+    with pytest.raises(wf.SceneError, match="shutter"):
+        render(SCENES["instance"], 1, shutter=shutter)
+
+
+def test_shared_paths_are_refused_where_something_moves():
+    options = {**OPTIONS, "reuse": True, "shutter": (0, 1)}
+    for name in ("instance", "point"):
+        with pytest.raises(wf.SceneError, match="move while the shutter is open"):
+            render(SCENES[name], 1, **options)
+    render(SCENES["camera"], 1, **options)
