@@ -23,6 +23,7 @@ from wavefront.features.dispersion import Dispersion
 from wavefront.features.instances import Instances
 from wavefront.features.interpolation import Interpolation, SmoothNormals
 from wavefront.features.media import Glow, Media
+from wavefront.features.motion import Deformations, Moments, Motion
 from wavefront.features.nested import Nested
 from wavefront.features.normal_maps import NormalMaps
 from wavefront.features.passing import Passing
@@ -100,6 +101,12 @@ SCENES: dict[type[Feature], tuple[list[Any], dict[str, Any]]] = {
     Backdrop: ([ball(GRAY), wf.Environment(0.5, backdrop=0.2)], {}),
     Background: ([ball(GRAY), SKY], {"background": (0.9, 0.1, 0.2)}),
 }
+RISE = np.stack([np.eye(4), TURNED])
+OPEN = {"shutter": (0, 1)}
+SCENES[Motion] = [TRIANGLE.transformed(wf.Keyframes([0, 1], RISE)), floor(GRAY), LAMP], OPEN
+SCENES[Moments] = SCENES[Motion]
+FORMS = np.stack([TRIANGLE.vertices, TRIANGLE.vertices + np.diag([0, 0, 1])[[2, 0, 0]]])
+SCENES[Deformations] = [wf.Mesh(FORMS, TRIANGLE.faces, times=[0, 1], material=GRAY), floor(GRAY), LAMP], OPEN
 SCENES[Receivers] = [ball(wf.Plastic(0.5)), floor(GRAY), wf.Environment(GRADIENT)], {}
 SCENES[Passing] = SCENES[Alpha]
 RELIED_ON = {Interpolation, Instances}  # others stop without them
