@@ -702,7 +702,17 @@ def test_what_is_no_message_changes_and_prints_nothing(
 @pytest.fixture
 def sent(monkeypatch: pytest.MonkeyPatch) -> Iterator[tuple[Page, list[tuple[float, ViewerFrame]]]]:
     """A page without a viewer, and what it sends, and when."""
-    page = Page("127.0.0.1", 0, "", viewpoint(), None, "none", look=lambda view: None, connected=lambda: None)
+    page = Page(
+        "127.0.0.1",
+        0,
+        "",
+        viewpoint(),
+        None,
+        "none",
+        look=lambda view: None,
+        connected=lambda: None,
+        path_of=None,
+    )
     frames: list[tuple[float, ViewerFrame]] = []
     page._send = lambda codes, frame, image: frames.append((page._sent[1], frame))  # type: ignore[method-assign]
     yield page, frames

@@ -7,7 +7,7 @@ import socket
 from contextlib import suppress
 from functools import cache
 from ipaddress import ip_address
-from typing import Any
+from typing import Any, Literal
 from urllib.parse import parse_qs, quote, urlsplit
 
 from ..core.errors import SceneError
@@ -114,7 +114,7 @@ def _is_origin(origin: str, host: str) -> bool:
 
 
 def is_message(data: Any) -> bool:
-    """Return whether a page may say this: a camera, or the value of an element.
+    """Return whether a page may say this: a camera, a click, or the value of an element.
 
     Viser itself also takes uploads, commands, other properties of elements, and the request to open a tunnel
     to the internet, and prints a traceback for what is none of its messages.
@@ -148,9 +148,21 @@ def _decoder() -> Any:
         tag="ViewerCameraMessage",
         **strict,
     )
+    click = defstruct(
+        "Click",
+        [
+            ("event_type", Literal["click"]),
+            ("ray_origin", triple),
+            ("ray_direction", triple),
+            ("screen_pos", tuple[tuple[float, float]]),
+            ("modifier", None),
+        ],
+        tag="ScenePointerMessage",
+        **strict,
+    )
     value = defstruct("Value", [("value", bool | int | float | str)], forbid_unknown_fields=True)
     update = defstruct("Update", [("uuid", str), ("updates", value)], tag="GuiUpdateMessage", **strict)
-    return Decoder(camera | update)
+    return Decoder(camera | click | update)
 
 
 def take_values(server: Any) -> None:

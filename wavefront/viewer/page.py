@@ -9,7 +9,7 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from functools import partial
 from html import escape
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,11 +22,15 @@ from ..image import Image
 from ..settings import DEFAULT_SPP
 from ..workers.machine import trim_heap
 from .background_denoiser import BackgroundDenoiser
+from .clicked_path import ClickedPath
 from .first_paint import FirstPaint, asked_first
 from .guard import Guard, take_values
 from .refiner import ViewerFrame
 from .shown import CHOICES, shown_codes
 from .viewpoint import FOV, Viewpoint, within
+
+if TYPE_CHECKING:
+    from .clicked_path import PathOf
 
 QUALITY = 85  # of pictures while they refine, sent as jpg; the last one is a png
 ARRIVAL = 3.0  # seconds in which a page that connects takes the view; before, it has views of its own
@@ -67,6 +71,8 @@ class Page:
         Called with the viewpoint when it has changed; it must return at once.
     connected
         Called when a browser has loaded the page; it must return at once, too.
+    path_of
+        Traces the path of a pixel of a view.
 
     Raises
     ------
@@ -84,6 +90,7 @@ class Page:
         tone: str,
         look: Callable[[Viewpoint], object],
         connected: Callable[[], object],
+        path_of: PathOf,
     ) -> None:
         self._look, self._connected, self._most_spp = look, connected, most_spp
         self._lock = threading.Condition()
@@ -106,6 +113,7 @@ class Page:
         self.elsewhere = f"http://{socket.gethostname()}{where}" if host in EVERYWHERE else None
         self._add_camera()
         self._add_controls()
+        self.path = ClickedPath(self._server, lambda: self.viewpoint, path_of, self.say)
         self._server.on_client_connect(self._greet)
         self._server.on_client_disconnect(self._forget)
         self._denoiser = BackgroundDenoiser(

@@ -9,7 +9,7 @@ import webbrowser
 from collections.abc import Callable
 from copy import copy
 from importlib.util import find_spec
-from typing import Any, Self, Unpack
+from typing import TYPE_CHECKING, Any, Self, Unpack
 
 from ..camera import Camera
 from ..codecs.tone import AUTO, TONE_NAMES
@@ -29,11 +29,30 @@ from .refiner import FIRST_DIVISOR, Refiner, ViewerFrame
 from .shown import VIEWER_AOVS
 from .viewpoint import Viewpoint
 
+if TYPE_CHECKING:
+    from ..watching.path import PathVertices
+    from .clicked_path import PathOf
+
 # Paths: a movement waits for less of a smaller wave, and one of half the size costs 10 % more.
 WAVE_SIZE = 1 << 15
 POLL = 0.5  # seconds
 WATCH = 0.5  # seconds between looks at whether the scene has changed
 FRAME = "100%", 600  # width and height of the page in a notebook
+# settings that decide where paths go
+OF_PATHS = frozenset(
+    (
+        "seed",
+        "sampler",
+        "integrator",
+        "max_bounces",
+        "light_sampler",
+        "lighting",
+        "ground",
+        "up",
+        "accel",
+        "filter",
+    )
+)
 REFUSED = dict.fromkeys(("checkpoint", "samples", "progress"), "it is for a picture of one view")
 
 
@@ -60,6 +79,8 @@ class Viewer:
         The first tone curve.
     spp
         Samples per pixel of the last picture of a view; None where they are not known before.
+    path_of
+        Traces the path of a pixel of a view.
 
     Attributes
     ----------
@@ -87,6 +108,7 @@ class Viewer:
         spp: int | None,
         renew: Callable[[], Session] | None = None,
         state: Callable[[], object] | None = None,
+        path_of: PathOf | None = None,
     ) -> None:
         self._renew, self._state = renew, state
         self._wanted: Camera | None = None
@@ -101,7 +123,10 @@ class Viewer:
             self._look(viewpoint)
             from .page import Page  # while workers trace, as it takes long to import viser
 
-            self._page = Page(host, port, token, viewpoint, spp, tone, self._look, self._refiner.refine)
+            path_of = path_of or _no_path
+            self._page = Page(
+                host, port, token, viewpoint, spp, tone, self._look, self._refiner.refine, path_of
+            )
         except BaseException:
             self._refiner.close()
             raise
@@ -357,7 +382,19 @@ def _opened(
         with giving_way():
             return Session(scene, spp, **settings)
 
-    return Viewer(renew(), viewpoint, host, port, token, tone, spp, renew, lambda: scene_state(scene))
+    def path_of(view: Viewpoint, pixel: tuple[int, int]) -> PathVertices:
+        from ..watching.trace import Wave  # here, as few look at a path
+
+        known = {name: value for name, value in settings.items() if name in OF_PATHS}
+        return Wave(scene, size=None, camera=view.camera, **known).path(pixel, sample=0)
+
+    return Viewer(
+        renew(), viewpoint, host, port, token, tone, spp, renew, lambda: scene_state(scene), path_of
+    )
+
+
+def _no_path(view: Viewpoint, pixel: tuple[int, int]) -> PathVertices:
+    raise SceneError("the viewer does not know the scene of its session")
 
 
 def _executor(workers: int | None, paths: int) -> str | None:

@@ -40,7 +40,7 @@ class Surroundings:
         x, y, z = ((low + high) / 2).tolist()
         return cls((x, y, z), float(np.linalg.norm(high - low)) / 2 or 1.0)
 
-    def to_page(self, point: Triple) -> Doubles:
+    def to_page(self, point: Triple | Doubles) -> Doubles:
         """Return a point (3,) of the scene on the page."""
         return (np.array(point) - self.center) / self.radius
 
