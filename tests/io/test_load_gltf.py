@@ -350,7 +350,7 @@ def punctual(b, node=(), **light):
 
 HALF = np.sqrt(0.5)
 QUARTER = {"rotation": [HALF, 0, 0, HALF]}  # about x; a light looks along -z
-CONE = {"innerConeAngle": 0.3, "outerConeAngle": 0.6}
+CONE = {"innerConeAngle": 0.15, "outerConeAngle": 0.6}
 
 
 @pytest.mark.parametrize(
@@ -363,7 +363,7 @@ CONE = {"innerConeAngle": 0.3, "outerConeAngle": 0.6}
             {"type": "spot"},
             {"": SpotLight, "position": [1, 2, 3], "angle": Near(90)},
         ),
-        ({}, {"type": "spot", "spot": CONE}, {"angle": Near(np.degrees(1.2)), "blend": Near(0.5)}),
+        ({}, {"type": "spot", "spot": CONE}, {"angle": Near(np.degrees(1.2)), "blend": Near(0.75)}),
         ({}, {"type": "spot", "intensity": 8}, {"direction": [0, 0, -1], "intensity": 8}),
         (QUARTER, {"type": "directional"}, {"": DirectionalLight, "direction": Near([0, 1, 0])}),
         ({}, {"type": "directional", "intensity": 3}, {"direction": [0, 0, -1], "irradiance": 3}),

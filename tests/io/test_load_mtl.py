@@ -302,6 +302,9 @@ def test_the_pbr_extension(given):
     assert found == {name: due.get(name, plain[name]) for name in found}
     with pytest.warns(UserWarning, match="not honored: .*: anisotropy"):
         given(*words, "aniso 0.75")
+    for number in (0, 1):
+        assert given("Pr 0.5", f"Pm {number}", f"Ps {number}")["sheen"] == number
+        assert given("Pr 0.5", f"Pm {number}", f"Ps {number}")["metallic"] == number
 
 
 def test_pbr_maps(given):

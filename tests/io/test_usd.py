@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from expected import Near, check
 
 import wavefront as wf
 from wavefront.codecs.images import write_image
@@ -410,6 +411,21 @@ def DomeLight "sky"
     assert isinstance(sky, wf.Environment)
     (plain,) = load(tmp_path, body.replace("bool inputs:normalize = 1", "")).lights[:1]
     np.testing.assert_allclose(np.ravel(plain.irradiance), 5 * np.pi * np.sin(np.radians(0.5)) ** 2)
+
+
+@pytest.mark.parametrize(
+    ("kind", "due"),
+    [
+        ("SphereLight", {"shapes[1].radius": 0.5, "shapes[1].emission": 1}),
+        ("DiskLight", {"shapes[1].bounds": Near([[-0.5, -0.5, 0], [0.5, 0.5, 0]], 1e-3)}),
+        ("RectLight", {"shapes[1].bounds": [[-0.5, -0.5, 0], [0.5, 0.5, 0]]}),
+        ("CylinderLight", {"shapes[1].bounds": Near([[-0.5, -0.5, -0.5], [0.5, 0.5, 0.5]], 1e-3)}),
+        ("DistantLight", {"lights[0].angle": Near(0.53)}),
+        ("DomeLight", {"lights[0].radiance": 1}),
+    ],
+)
+def test_inputs_that_are_not_written_are_those_of_the_schema(tmp_path: Path, kind: str, due: Any) -> None:
+    check(load(tmp_path, f'{MESH}def {kind} "lamp"\n{{\n}}\n'), due)
 
 
 PARTS = """    double radius = 2

@@ -26,24 +26,8 @@ from .gprims import along
 from .materials import Materials
 from .values import check_even, mean_scale, value_of
 
-# inputs of lights that are read, and their defaults
-INPUTS: dict[str, Any] = {
-    "color": (1.0, 1.0, 1.0),
-    "intensity": 1.0,
-    "exposure": 0.0,
-    "normalize": False,
-    "enableColorTemperature": False,
-    "colorTemperature": 6500.0,
-    "radius": 0.5,
-    "width": 1.0,
-    "height": 1.0,
-    "length": 1.0,
-    "angle": 0.53,
-    "texture:file": None,
-    "texture:format": "automatic",
-    "shaping:cone:angle": 90.0,
-    "shaping:cone:softness": 0.0,
-}
+# what inputs are of a light without the schema that has them; of its own schema, usd-core knows the defaults
+ABSENT = {"shaping:cone:angle": 90.0, "shaping:cone:softness": 0.0, "texture:format": "automatic"}
 # inputs that are not read, by the values with which they change nothing
 UNREAD = {"diffuse": 1.0, "specular": 1.0, "shaping:focus": 0.0, "shaping:ies:file": None}
 KELVIN = 1e3, 1e6  # color temperatures; lower ones are clamped by usd-core, too
@@ -94,8 +78,8 @@ class Lamp:
         self.materials.lose(self.prim, what, done)
 
     def of(self, name: str) -> Any:
-        """Return an input of the table."""
-        return value_of(self.prim, self.materials.time, f"inputs:{name}", INPUTS[name])
+        """Return an input."""
+        return value_of(self.prim, self.materials.time, f"inputs:{name}", ABSENT.get(name))
 
     def flag(self, name: str) -> bool:
         """Return an attribute that is no input."""
