@@ -34,7 +34,7 @@ if TYPE_CHECKING:
         ThinDielectric,
         ThinDisney,
     )
-    from .camera import Camera
+    from .camera import Camera, Fisheye, Projection
     from .camera.moves import interpolate_cameras, orbit
     from .colors import blackbody, exposure, from_photometric, srgb, to_photometric
     from .compile.program import Feature
@@ -159,7 +159,7 @@ _HOMES = {  # of the public names: a module is imported when one of its names is
         "Mirror Mix NullSurface OrenNayar Plastic Principled ShadowCatcher Sides "
         "ThinDielectric ThinDisney"
     ),
-    ".camera": "Camera",
+    ".camera": "Camera Fisheye Projection",
     ".camera.moves": "interpolate_cameras orbit",
     ".colors": "blackbody exposure from_photometric srgb to_photometric",
     ".compile.program": "Feature",
@@ -242,6 +242,7 @@ __all__ = [
     "Emitters",
     "Environment",
     "Feature",
+    "Fisheye",
     "Frame",
     "GaussianFilter",
     "Geometry",
@@ -288,6 +289,7 @@ __all__ = [
     "PointLights",
     "Points",
     "Principled",
+    "Projection",
     "Projector",
     "Rayleigh",
     "Receiver",

@@ -27,6 +27,7 @@ from ..core.suggestions import Answers, suggests_keywords
 from ..motion import Motion, Moving, product
 from ..sampling.tiles import PictureTiles, Tiles
 from .distortion import Distortion
+from .fisheye import Fisheye
 from .projection import Orthographic, Panorama, Perspective, Projection
 
 MAX_SIDE = 65_536  # pixels; a row-major pixel index then fits in 32 bits
@@ -90,9 +91,7 @@ class Camera(Moving, Answers):
         self.origin = finite_array("Camera origin", origin, (3,))
         self.rotation = rotation_matrix("Camera rotation", rotation)
         if not isinstance(projection, Projection):
-            raise SceneError(
-                f"Camera projection is {in_brief(projection)}; wf.Camera.look_at and others make one"
-            )
+            raise SceneError(f"Camera projection is {in_brief(projection)}; it must be a wf.Projection")
         self.projection = projection
         self.resolution = image_size(size)
         projection.check(self.resolution)
@@ -247,21 +246,87 @@ class Camera(Moving, Answers):
         """
         if size is None:
             raise SceneError("from_intrinsics needs size=(width, height), that of the calibrated pictures")
-        width, height = image_size(size)
-        k = finite_array("K", K, (3, 3))
-        (fx, skew, cx), (zero, fy, cy), last = k.tolist()
-        if zero != 0 or last != [0, 0, 1] or not (fx > 0 and fy > 0):
-            raise SceneError(f"K must be [[fx, s, cx], [0, fy, cy], [0, 0, 1]], fx, fy > 0; got {k.tolist()}")
+        height = image_size(size)[1]
+        fy, parts = _calibration(K, image_size(size), pixel_centers)
         axes, shift = _extrinsics(R, t)
-        cx, cy = cx + _to_film(pixel_centers), cy + _to_film(pixel_centers)
         lens = Perspective(
             2 * float(np.degrees(arctan2(np.float64(height / 2), np.float64(fy)))),
-            shift=(0.5 - cx / width, cy / height - 0.5),
-            pixel_aspect=fy / fx,
             aperture=aperture,
             focus=focus,
-            skew=skew / fx,
             distortion=None if distortion is None else Distortion(distortion),
+            **parts,
+        )
+        return cls(-axes.T @ shift, axes.T * (1, -1, -1), lens, size, crop)
+
+    @classmethod
+    @suggests_keywords
+    def fisheye(
+        cls,
+        K: ArrayLike,
+        D: ArrayLike | None = None,
+        R: ArrayLike | None = None,
+        t: ArrayLike | None = None,
+        size: ImageSize | None = None,
+        *,
+        mapping: str = "equidistant",
+        pixel_centers: PixelCenters = "integer",
+        aperture: float = 0,
+        focus: float | None = None,
+        crop: Window | None = None,
+    ) -> Camera:
+        """Place a calibrated camera with a fisheye lens in OpenCV's convention, that of `cv2.fisheye`.
+
+        A point at angle θ to the axis is seen at K·(θ_d·x/ρ, θ_d·y/ρ, 1), where (x, y) is its place across
+        the axis, ρ the length of that, and θ_d = θ·(1 + k1·θ² + k2·θ⁴ + k3·θ⁶ + k4·θ⁸).
+
+        Parameters
+        ----------
+        K
+            As for `from_intrinsics`; the skew K[0][1] is fx·alpha of OpenCV.
+        D
+            (k1, k2, k3, k4), of any shape; by default zeros.
+        R, t
+            As for `from_intrinsics`; by default the camera stands at the origin and looks along z, with y down.
+        size
+            (width, height) in pixels; it must be given.
+        mapping
+            "equidistant", or another one of `Fisheye`, without D.
+        pixel_centers
+            As for `from_intrinsics`.
+        aperture, focus, crop
+            As for `from_matrix`.
+
+        Raises
+        ------
+        SceneError
+            If K has another form, R is not a rotation, or an argument is out of range.
+
+        Notes
+        -----
+        What is more than 90° from the axis is seen, too, up to where the polynomial folds. Beyond that the
+        picture is black. Source: J. Kannala and S. Brandt, "A Generic Camera Model and Calibration Method for
+        Conventional, Wide-Angle, and Fish-Eye Lenses", IEEE PAMI 28(8), 2006.
+
+        Examples
+        --------
+        >>> K = [[160, 0, 255.5], [0, 160, 255.5], [0, 0, 1]]
+        >>> camera = wf.Camera.fisheye(K, (-0.02, 0.003, 0, 0), size=512)
+        >>> camera.project([(1, 0, 1), (1, 0, -0.1)], "integer")[0].round(2)
+        array([[379.93, 255.5 ],
+               [524.92, 255.5 ]])
+        """
+        if size is None:
+            raise SceneError("fisheye needs size=(width, height), that of the calibrated pictures")
+        fy, parts = _calibration(K, image_size(size), pixel_centers)
+        alone = R is None and t is None
+        axes, shift = (np.eye(3), np.zeros(3)) if alone else _extrinsics(np.eye(3) if R is None else R, t)
+        lens = Fisheye(
+            focal=fy / image_size(size)[1],
+            mapping=mapping,
+            distortion=D,
+            aperture=aperture,
+            focus=focus,
+            **parts,
         )
         return cls(-axes.T @ shift, axes.T * (1, -1, -1), lens, size, crop)
 
@@ -380,6 +445,7 @@ class Camera(Moving, Answers):
         focus: float | None = None,
         shift: tuple[float, float] | None = None,
         height: float | None = None,
+        projection: Projection | None = None,
         crop: Window | None = None,
     ) -> Camera:
         """Return a camera of which some things differ; what is not given stays.
@@ -396,6 +462,8 @@ class Camera(Moving, Answers):
             As of `look_at`. Another size has no crop, unless one is given.
         height
             As of `orthographic`.
+        projection
+            Another map from points of the film to rays, such as `Fisheye`, or one of your own.
 
         Raises
         ------
@@ -410,18 +478,59 @@ class Camera(Moving, Answers):
         """
         eye = self.origin if origin is None else finite_array("Camera origin", origin, (3,))
         axes, lens = self.rotation, dict[str, Any]()
+        base = self.projection if projection is None else projection
         if target is not None:
             eye, axes, distance = _look(eye, target, axes[:, 1] if up is None else up)
-            lens = {"focus": distance} if isinstance(self.projection, Perspective) else {}
+            lens = {"focus": distance} if "focus" in vars(base) and projection is None else {}
         elif up is not None:
             axes = _axes(axes[:, 2], up)
         given: dict[str, Any] = {"fov": fov, "aperture": aperture, "focus": focus, "shift": shift}
         given["height"] = height
         lens |= {name: value for name, value in given.items() if value is not None}
-        projection = self.projection.replaced(**lens) if lens else self.projection
+        chosen = base.replaced(**lens) if lens else base
         window = self.window if size is None and crop is None else crop
-        camera = Camera(eye, axes, projection, self.resolution if size is None else size, window)
+        camera = Camera(eye, axes, chosen, self.resolution if size is None else size, window)
         return self._carrying(camera) if origin is target is up is None else camera
+
+    @suggests_keywords
+    def stereo(self, baseline: float) -> tuple[Self, Self]:
+        """Return two parallel cameras side by side, whose pictures are rectified.
+
+        Parameters
+        ----------
+        baseline
+            Distance of the right camera from the left one, which is this camera; scene units.
+
+        Returns
+        -------
+        left, right
+            The camera itself, and one at `baseline` to its right. They move together.
+
+        Raises
+        ------
+        SceneError
+            If the distance is not above 0.
+
+        Notes
+        -----
+        A perspective camera with K sees a point at depth z with the disparity K[0][0]·baseline/z: so many
+        pixels farther to the left in the right picture.
+
+        Examples
+        --------
+        >>> left, right = wf.Camera.look_at((0, 0, 4), (0, 0, 0)).stereo(0.1)
+        >>> right.origin.tolist()
+        [0.1, 0.0, 4.0]
+        """
+        aside = np.eye(4)
+        aside[0, 3] = number("baseline", baseline, lambda x: x > 0, "above 0")
+        right = copy(self)
+        right.origin = self.origin + self.rotation[:, 0] * aside[0, 3]
+        if self.motion is not None:
+            moved = product(self.motion, aside)
+            assert isinstance(moved, Motion)
+            right.motion = moved
+        return self, right
 
     # --- Time -----------------------------------------------------------------------------------
 
@@ -509,7 +618,9 @@ class Camera(Moving, Answers):
 
     @suggests_keywords
     def intrinsics(self, pixel_centers: PixelCenters = "integer") -> Doubles:
-        """Return the matrix K (3, 3) of `from_intrinsics`, for the whole picture and without distortion.
+        """Return the matrix K (3, 3) of `from_intrinsics` or `fisheye`, for the whole picture.
+
+        Distortion is no part of it.
 
         Parameters
         ----------
@@ -519,9 +630,10 @@ class Camera(Moving, Answers):
         Raises
         ------
         SceneError
-            If the camera is not a perspective camera, or `pixel_centers` is something else.
+            If the camera has neither a perspective nor a fisheye lens, or `pixel_centers` is something else.
         """
-        k = self._perspective().matrix(self.resolution)
+        lens = self.projection if isinstance(self.projection, Fisheye) else self._perspective()
+        k = lens.matrix(self.resolution)
         k[:2, 2] -= _to_film(pixel_centers)
         return k
 
@@ -570,6 +682,7 @@ class Camera(Moving, Answers):
         """
         near = number("near", near, lambda x: x > 0, "above 0")
         far = number("far", far, lambda x: x > near, f"above near, which is {near:g}")
+        self._perspective()
         (fx, skew, cx), (_, fy, cy), _ = self.intrinsics("half").tolist()
         width, height = self.resolution
         return np.array(
@@ -666,7 +779,7 @@ class Camera(Moving, Answers):
         """
         offset, direction = self.projection.rays(x, y, self.resolution, lens)
         eye = column(self.origin - center)
-        towards = normalize(self._turned(direction))
+        towards = normalize(self._turned(np.asarray(direction, f4)))
         origin = np.repeat(eye, len(x), 1) if offset is None else eye + self._turned(offset)
         return origin, towards if towards.shape[1] == len(x) else np.repeat(towards, len(x), 1)
 
@@ -733,8 +846,8 @@ class Camera(Moving, Answers):
             picture have coordinates outside of it. NaN for points that no picture could show: behind the
             camera, or where its distortion has folded.
         depth
-            (n,) distance along the view axis, scene units, negative behind the camera; of a panorama the
-            distance itself.
+            (n,) distance along the view axis, scene units, negative behind the camera; of a panorama or a
+            fisheye the distance itself.
 
         Raises
         ------
@@ -787,6 +900,26 @@ def _axes_of(convention: str) -> tuple[int, int, int]:
     """Return the signs of right, up and backward in the axes x, y and z of a convention."""
     one_of("convention", convention, ("opengl", "opencv"))
     return (1, -1, -1) if convention == "opencv" else (1, 1, 1)
+
+
+def _calibration(
+    K: ArrayLike, size: tuple[int, int], pixel_centers: str
+) -> tuple[float, dict[str, Any]]:
+    """Return the focal length, pixels of the height, and what else projections take of a matrix K (3, 3).
+
+    Raises
+    ------
+    SceneError
+        If it has another form.
+    """
+    width, height = size
+    k = finite_array("K", K, (3, 3))
+    (fx, skew, cx), (zero, fy, cy), last = k.tolist()
+    if zero != 0 or last != [0, 0, 1] or not (fx > 0 and fy > 0):
+        raise SceneError(f"K must be [[fx, s, cx], [0, fy, cy], [0, 0, 1]], fx, fy > 0; got {k.tolist()}")
+    cx, cy = cx + _to_film(pixel_centers), cy + _to_film(pixel_centers)
+    shift = (0.5 - cx / width, cy / height - 0.5)
+    return fy, {"shift": shift, "pixel_aspect": fy / fx, "skew": skew / fx}
 
 
 def _to_film(pixel_centers: str) -> float:

@@ -23,12 +23,42 @@ from ..sampling.warp import uniform_disk
 from .distortion import GRID, Distortion
 
 Size = tuple[int, int]
+CHECKED = 5  # points along each side of a film, at which a projection is checked
+INVERSE = 1e-3  # distance between a film point and where its ray is projected to, relative to the larger side
 
 
 class Projection(Parametrized, ABC):
-    """The interface of projections: film points to rays in camera space."""
+    """Base class of projections: maps from points of the film to rays in camera space, and back.
 
-    uses_lens: bool = False  # rays start at a sampled point of a lens
+    Camera space has x to the right, y up and z backward: the camera looks along -z. Film points are in pixels of
+    the whole picture, x from the left and y from the top.
+
+    Attributes
+    ----------
+    uses_lens
+        Whether rays start at sampled points of a lens.
+    sees_all
+        Whether every point of the film has a ray. Where not, `rays` returns NaN as directions, and the picture
+        is black.
+
+    Examples
+    --------
+    >>> class Cylindrical(wf.Projection):
+    ...     def rays(self, x, y, size, lens):
+    ...         angle = (x - np.float32(size[0] / 2)) * np.float32(2 / size[1])
+    ...         up = np.float32(1) - y * np.float32(2 / size[1])
+    ...         return None, np.stack([np.sin(angle), up, -np.cos(angle)])
+    ...     def project(self, points, size):
+    ...         x, y, z = points
+    ...         across = np.hypot(x, z)
+    ...         film = [size[0] + size[1] * np.arctan2(x, -z), size[1] * (1 - y / across)]
+    ...         return np.stack(film) / 2, across
+    >>> camera = wf.Camera.look_at((0, 0, 4), (0, 0, 0), size=(96, 32)).replace(projection=Cylindrical())
+    >>> image = wf.render(wf.Scene([wf.Box((0, 0, 0), 1)], camera=camera), 1)
+    """
+
+    uses_lens: bool = False
+    sees_all: bool = True
 
     def scaled(self, factor: float) -> Projection:
         """Return the projection for a scene scaled by `factor`: itself, unless it has lengths."""
@@ -68,7 +98,7 @@ class Projection(Parametrized, ABC):
         offset
             (3, n) origins relative to the camera, scene units; None if all are at the camera.
         direction
-            (3, n) or (3, 1), of any length above 0.
+            (3, n) or (3, 1), of any length above 0; NaN where nothing is seen (`sees_all`).
         """
 
     @abstractmethod
@@ -99,13 +129,56 @@ class Projection(Parametrized, ABC):
         return points
 
     def check(self, size: Size) -> None:
-        """Check that every point of the film has a ray.
+        """Check that points of the film have rays, and that these are projected to the points.
 
         Raises
         ------
         SceneError
-            If a point has none.
+            If not.
         """
+        width, height = size
+        parts = np.linspace(0, 1, CHECKED + 2)[1:-1]
+        x, y = (each.ravel().astype(f4) for each in np.meshgrid(parts * width, parts * height))
+        seen = _checked_rays(self, x, y, size)
+        pixels, depth = self.project(seen, size)
+        name = type(self).__name__
+        if np.shape(pixels) != (2, len(x)) or np.shape(depth) != (len(x),):
+            raise SceneError(
+                f"{name}.project returns shapes {np.shape(pixels)} and {np.shape(depth)} for {len(x)} points; "
+                f"they must be (2, {len(x)}) and ({len(x)},)"
+            )
+        off = np.abs(pixels - np.stack([x, y])).max(0)
+        off[np.isnan(seen[0])] = 0
+        if not off.max() <= INVERSE * max(size):
+            at = int(np.nan_to_num(off, nan=np.inf).argmax())
+            raise SceneError(
+                f"{name}.project takes a point on the ray of film point ({x[at]:g}, {y[at]:g}) to "
+                f"({pixels[0, at]:g}, {pixels[1, at]:g}); it must be the inverse of rays"
+            )
+
+
+def _checked_rays(projection: Projection, x: Floats, y: Floats, size: Size) -> Doubles:
+    """Return a point (3, n) on the ray of each film point (n,), NaN where there is none.
+
+    Raises
+    ------
+    SceneError
+        If what a class returns is malformed, or a ray is missing that must be there.
+    """
+    offset, direction = projection.rays(x, y, size, None)
+    name, shapes = type(projection).__name__, ((3, len(x)), (3, 1))
+    for what, each in (("origins", offset), ("directions", direction)):
+        if each is not None and np.shape(each) not in shapes:
+            raise SceneError(f"{name}.rays returns {what} of shape {np.shape(each)}; it must be {shapes[0]}")
+    toward = np.broadcast_to(np.asarray(direction, np.float64), shapes[0])
+    lost = ~(np.isfinite(toward).all(0) & toward.any(0))
+    if lost.any() and (projection.sees_all or not np.isnan(toward[:, lost]).all()):
+        at = int(np.flatnonzero(lost)[0])
+        raise SceneError(
+            f"{name}.rays returns the direction {toward[:, at].tolist()} for film point ({x[at]:g}, {y[at]:g}); "
+            "where nothing is seen it must be NaN, and sees_all of the class False"
+        )
+    return toward if offset is None else toward + offset
 
 
 class Perspective(Projection):
