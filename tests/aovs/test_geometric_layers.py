@@ -36,6 +36,9 @@ CAMERAS = {
     ),
     "orthographic": wf.Camera.orthographic(EYE, TARGET, height=5, size=SIZE),
     "panorama": wf.Camera.panorama(EYE, TARGET, size=(96, 48)),
+    "fisheye": wf.Camera.fisheye(
+        [[20, 0, 33], [0, 19, 22], [0, 0, 1]], (-0.1, 0, 0, 0), TURN, -TURN @ EYE, SIZE
+    ),
 }
 
 

@@ -27,11 +27,14 @@ CAMERAS = {
     "skewed": wf.Camera.from_intrinsics(SKEWED, TURN, SHIFT, (640, 480)),
     "orthographic": wf.Camera.orthographic((1, 2, 3), (0, 0, -1), height=5, size=(64, 48)),
     "panorama": wf.Camera.panorama((1, 2, 3), (0, 0, -1), size=(64, 32)),
+    "fisheye": wf.Camera.fisheye(SKEWED, (-0.02, 0.003, 0.001, -0.0005), TURN, SHIFT, (640, 480)),
+    "equisolid": wf.Camera.fisheye(K, None, TURN, SHIFT, (640, 480), mapping="equisolid"),
     **{
         name: wf.Camera.from_intrinsics(SKEWED, TURN, SHIFT, (640, 480), distortion=numbers)
         for name, numbers in LENSES.items()
     },
 }
+ALL_AROUND = "panorama", "fisheye", "equisolid"  # which measure depth along the ray
 
 
 def opencv(points, k, turn, shift, d):
@@ -62,10 +65,10 @@ def test_points_on_rays_are_seen_where_the_rays_begin(name: str) -> None:
     assert pixels.shape == (500, 2)
     assert np.abs(pixels - film.astype(f4)).max() < 2e-3 if name in LENSES or name == "skewed" else 1e-3
     ahead = (points - camera.origin) @ -camera.rotation[:, 2]
-    assert depth == pytest.approx(far if name == "panorama" else ahead, rel=1e-5)
+    assert depth == pytest.approx(far if name in ALL_AROUND else ahead, rel=1e-5)
 
 
-@pytest.mark.parametrize("name", [n for n in CAMERAS if n != "panorama"])
+@pytest.mark.parametrize("name", [n for n in CAMERAS if n not in ALL_AROUND])
 def test_what_is_behind_is_not_seen(name: str) -> None:
     camera = CAMERAS[name]
     behind = camera.origin + np.array([[0.1], [3.0]]) * camera.rotation[:, 2] + 0.01 * camera.rotation[:, 0]

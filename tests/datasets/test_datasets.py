@@ -130,6 +130,25 @@ def test_the_distortion_is_opencvs(tmp_path: Path) -> None:
     assert loaded(tmp_path / "cameras.json")["000000"]["opencv"]["distortion"][:4] == list(lens)
 
 
+def test_a_fisheye_is_opencvs(tmp_path: Path) -> None:
+    """K and coefficients project what pixels show onto them; there is no matrix of OpenGL."""
+    given = ([[20, 0, 14.5], [0, 19, 13], [0, 0, 1]], (-0.05, 0.003, 0, 0))
+    camera = wf.Camera.fisheye(*given, START.extrinsics(), size=SIZE, crop=(2, 3, 20, 20))
+    wf.write_dataset(tmp_path, scene(), [camera], 1, progress=False, aovs="position")
+    found = loaded(tmp_path / "cameras.json")["000000"]
+    cv = found["opencv"]
+    assert (cv["model"], cv["mapping"]) == ("fisheye", "equidistant")
+    assert "projection" not in found["opengl"]
+    points, pixels = seen_points(tmp_path, 0)
+    x, y, z = (points @ np.array(cv["world_to_camera"]).T)[:, :3].T
+    angle = np.arctan2(np.hypot(x, y), z)
+    k1, k2, _, _ = cv["distortion"]
+    radius = angle * (1 + k1 * angle**2 + k2 * angle**4) / np.hypot(x, y)
+    seen = np.stack([x * radius, y * radius, np.ones_like(x)], 1) @ np.array(cv["K"]).T
+    assert len(points) > 100
+    assert np.abs(seen[:, :2] - pixels).max() < 0.01
+
+
 @pytest.fixture(scope="module")
 def coco(folder: Path) -> COCO:
     return COCO(folder / "annotations.json")
@@ -406,6 +425,10 @@ def test_views_that_cannot_be_compared_are_rendered_again(tmp_path: Path) -> Non
         ({"objects": ["bal"]}, r"objects has 'bal'; .*'other'; did you mean 'ball'\?"),
         ({"cameras": []}, "cameras is empty"),
         ({"cameras": [START, wf.Camera.panorama((0, 0, 0))]}, r"cameras\[1\]: .* no intrinsic matrix"),
+        (
+            {"cameras": [wf.Camera.fisheye(np.eye(3), size=9)], "format": "bop"},
+            r"cameras\[0\] has a lens Fisheye\(.*BOP's cameras are perspective ones",
+        ),
         ({"cameras": [3]}, r"cameras\[0\] must be a wf.Camera"),
         ({"cameras": 3}, "cameras must be a list of cameras, such as .*, got 3"),
         ({"millimeters": 0, "format": "bop"}, "millimeters is 0; it must be above 0"),

@@ -610,8 +610,15 @@ CAMERAS = {
     "lens with distortion": calibrated(aperture=0.7, focus=2.0),
     "orthographic": wf.Camera.orthographic(*VIEW, height=2, size=(24, 16)),
     "panorama": wf.Camera.panorama(*VIEW, size=(24, 16)),
+    "fisheye": wf.Camera.look_at(*VIEW, size=(24, 16)).replace(
+        projection=wf.Fisheye(150, distortion=(-0.02, 0.003, 0, 0), skew=0.02)
+    ),
+    "fisheye with a lens": wf.Camera.look_at(*VIEW, size=(24, 16)).replace(
+        projection=wf.Fisheye(110, mapping="equisolid", aperture=0.4, focus=2.0)
+    ),
     "crop": wf.Camera.look_at(*VIEW, size=(24, 16), crop=(3, 2, 20, 10)),
 }
+FISHEYES = "fisheye", "fisheye with a lens"
 cameras = pytest.mark.parametrize("camera", CAMERAS.values(), ids=list(CAMERAS))
 
 
@@ -649,7 +656,7 @@ def test_importance_is_how_densely_rays_meet_a_plane(camera: wf.Camera) -> None:
     np.testing.assert_allclose(importance * area, 1, rtol=5e-3)
 
 
-@pytest.mark.parametrize("name", [name for name in CAMERAS if name != "panorama"])
+@pytest.mark.parametrize("name", [name for name in CAMERAS if name not in ("panorama", *FISHEYES)])
 def test_cameras_do_not_see_behind_themselves(name: str) -> None:
     camera = CAMERAS[name]
     _, _, lens, origin, direction, t = some_rays(camera)

@@ -49,6 +49,8 @@ CALLS: dict[str, dict[str, Any]] = {
     "Camera.framing": {"scene": SCENE},
     "Camera.orthographic": {"origin": (0, 0, 4), "target": P3, "height": 2},
     "Camera.panorama": {"origin": P3},
+    "Camera.fisheye": {"K": np.eye(3), "D": np.zeros(4), "R": np.eye(3), "t": P3, "size": (4, 4)},
+    "Fisheye": {"fov": 90},
     "Conductor.named": {"name": "gold"},
     "Dielectric.named": {"name": "glass"},
     "Instance.many": {"mesh": MESH, "transforms": [np.eye(4)]},

@@ -19,7 +19,7 @@ def docstrings(name):
     thing = getattr(wf, name)
     yield name, inspect.getdoc(thing) or ""
     if inspect.isclass(thing):
-        for attribute, member in vars(thing).items():
+        for attribute, member in list(vars(thing).items()):  # copies add to a class
             if not attribute.startswith("_"):
                 yield f"{name}.{attribute}", inspect.getdoc(member) or ""
 

@@ -259,6 +259,17 @@ def test_a_rolled_camera_keeps_its_roll() -> None:
     assert viewpoint(wf.Camera.panorama((0, 0, 5), (0, 0, 0), size=(64, 32))).fov == 40
 
 
+def test_a_fisheye_stays_one() -> None:
+    """In the picture and in the code that is copied, but no control changes its lens."""
+    lens = wf.Fisheye(150, mapping="equisolid")
+    camera = wf.Camera.look_at((0, 0, 5), (0, 0, 0), size=(64, 48)).replace(projection=lens)
+    view = viewpoint(camera)
+    assert view.camera.projection is lens
+    assert view.controls == ()
+    assert repr(eval(view.code, {"wf": wf})) == repr(view.camera)
+    assert viewpoint(camera.replace(projection=wf.Camera.look_at((0, 0, 5), (0, 0, 0)).projection)).controls
+
+
 def test_a_picture_has_the_shape_of_the_page_and_not_more_pixels_than_allowed() -> None:
     view = viewpoint(CAMERA.resized((400, 300)))
     assert view.resized(1600, 900).size == (462, 260)

@@ -286,7 +286,7 @@ class Camera(Moving, Answers):
         D
             (k1, k2, k3, k4), of any shape; by default zeros.
         R, t
-            As for `from_intrinsics`; by default the camera stands at the origin and looks along z, with y down.
+            As for `from_intrinsics`; by default the camera is at the origin and looks along z, with y down.
         size
             (width, height) in pixels; it must be given.
         mapping
@@ -312,8 +312,8 @@ class Camera(Moving, Answers):
         >>> K = [[160, 0, 255.5], [0, 160, 255.5], [0, 0, 1]]
         >>> camera = wf.Camera.fisheye(K, (-0.02, 0.003, 0, 0), size=512)
         >>> camera.project([(1, 0, 1), (1, 0, -0.1)], "integer")[0].round(2)
-        array([[379.93, 255.5 ],
-               [524.92, 255.5 ]])
+        array([[379.76, 255.5 ],
+               [514.1 , 255.5 ]])
         """
         if size is None:
             raise SceneError("fisheye needs size=(width, height), that of the calibrated pictures")
@@ -323,7 +323,7 @@ class Camera(Moving, Answers):
         lens = Fisheye(
             focal=fy / image_size(size)[1],
             mapping=mapping,
-            distortion=D,
+            distortion=None if D is None else finite_array("D", np.ravel(as_array("D", D)), (4,)),
             aperture=aperture,
             focus=focus,
             **parts,
@@ -902,9 +902,7 @@ def _axes_of(convention: str) -> tuple[int, int, int]:
     return (1, -1, -1) if convention == "opencv" else (1, 1, 1)
 
 
-def _calibration(
-    K: ArrayLike, size: tuple[int, int], pixel_centers: str
-) -> tuple[float, dict[str, Any]]:
+def _calibration(K: ArrayLike, size: tuple[int, int], pixel_centers: str) -> tuple[float, dict[str, Any]]:
     """Return the focal length, pixels of the height, and what else projections take of a matrix K (3, 3).
 
     Raises

@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike
 
 from ..arrays.elementary import arctan2, sin_cos
 from ..arrays.vec import Doubles, Floats, f4
-from ..core.errors import SceneError, as_array, finite_array, number, one_of
+from ..core.errors import SceneError, finite_array, number, one_of
 from ..core.suggestions import suggests_keywords
 from ..sampling.warp import uniform_disk
 from .mappings import MAPPINGS, LensMapping, Polynomial
@@ -71,7 +71,7 @@ class Fisheye(Projection):
         focal: float | None = None,
     ) -> None:
         self.mapping = one_of("Fisheye mapping", mapping, tuple(MAPPINGS))
-        self.distortion = _coefficients(distortion)
+        self.distortion = None if distortion is None else finite_array("Fisheye distortion", distortion, (4,))
         self.shift = finite_array("Fisheye shift", shift, (2,))
         self.pixel_aspect = number("Fisheye pixel_aspect", pixel_aspect, lambda x: x > 0, "above 0")
         self.skew = number("Fisheye skew", skew)
@@ -79,8 +79,12 @@ class Fisheye(Projection):
         if focus is None and self.aperture > 0:
             raise SceneError(f"Fisheye aperture is {aperture!r}; a lens needs a focus distance: give focus")
         least = self.aperture / 2
-        self.focus = None if focus is None else number(
-            "Fisheye focus", focus, lambda x: x > least, f"above {least:g}, the radius of the lens"
+        self.focus = (
+            None
+            if focus is None
+            else number(
+                "Fisheye focus", focus, lambda x: x > least, f"above {least:g}, the radius of the lens"
+            )
         )
         self.uses_lens = self.aperture > 0
         self._lens = self._checked_mapping()
@@ -95,8 +99,8 @@ class Fisheye(Projection):
             return MAPPINGS[self.mapping]
         if self.mapping != "equidistant":
             raise SceneError(
-                f"Fisheye mapping is {self.mapping!r} and distortion {self.distortion.tolist()}; the distortion "
-                "is one of the mapping 'equidistant'"
+                f"Fisheye mapping is {self.mapping!r} and distortion {self.distortion.tolist()}; the "
+                "distortion is one of the mapping 'equidistant'"
             )
         return Polynomial(self.distortion)
 
@@ -124,7 +128,7 @@ class Fisheye(Projection):
         return lens
 
     def rays(self, x: Floats, y: Floats, size: Size, lens: Floats | None) -> tuple[Floats | None, Floats]:
-        """Return rays through the film, or from lens points to the points in focus; NaN outside of the circle."""
+        """Return rays through the film, or from lens points to what is in focus; NaN outside."""
         (cx, cy), (fx, fy) = self.intrinsics(size)
         down = (y.astype(np.float64) - cy) / fy
         right = (x.astype(np.float64) - cx) / fx - self.skew * down
@@ -177,10 +181,3 @@ class Fisheye(Projection):
         """Return OpenCV's matrix K (3, 3), in pixels with centers at .5."""
         (cx, cy), (fx, fy) = self.intrinsics(size)
         return np.array([[fx, self.skew * fx, cx], [0, fy, cy], [0, 0, 1]])
-
-
-def _coefficients(value: ArrayLike | None) -> Doubles | None:
-    """Return the coefficients (4,) of a distortion, which may be of any shape."""
-    if value is None:
-        return None
-    return finite_array("Fisheye distortion", np.ravel(as_array("Fisheye distortion", value)), (4,))

@@ -1,8 +1,8 @@
 """Mappings of fisheye lenses: how far from the axis a ray is seen, by its angle to the view axis.
 
-Distances are in focal lengths, angles in radians. Source of the polynomial: J. Kannala and S. Brandt, "A Generic
-Camera Model and Calibration Method for Conventional, Wide-Angle, and Fish-Eye Lenses", IEEE PAMI 28(8), 2006,
-with OpenCV's parameters (`cv2.fisheye`).
+Distances are in focal lengths, angles in radians. Source of the polynomial: J. Kannala and S. Brandt, "A
+Generic Camera Model and Calibration Method for Conventional, Wide-Angle, and Fish-Eye Lenses", IEEE PAMI
+28(8), 2006, with OpenCV's parameters (`cv2.fisheye`).
 """
 
 from __future__ import annotations

@@ -30,16 +30,16 @@ INVERSE = 1e-3  # distance between a film point and where its ray is projected t
 class Projection(Parametrized, ABC):
     """Base class of projections: maps from points of the film to rays in camera space, and back.
 
-    Camera space has x to the right, y up and z backward: the camera looks along -z. Film points are in pixels of
-    the whole picture, x from the left and y from the top.
+    Camera space has x to the right, y up and z backward: the camera looks along -z. Film points are in pixels
+    of the whole picture, x from the left and y from the top.
 
     Attributes
     ----------
     uses_lens
         Whether rays start at sampled points of a lens.
     sees_all
-        Whether every point of the film has a ray. Where not, `rays` returns NaN as directions, and the picture
-        is black.
+        Whether every point of the film has a ray. Where not, `rays` returns NaN as directions, and the
+        picture is black.
 
     Examples
     --------
@@ -144,8 +144,8 @@ class Projection(Parametrized, ABC):
         name = type(self).__name__
         if np.shape(pixels) != (2, len(x)) or np.shape(depth) != (len(x),):
             raise SceneError(
-                f"{name}.project returns shapes {np.shape(pixels)} and {np.shape(depth)} for {len(x)} points; "
-                f"they must be (2, {len(x)}) and ({len(x)},)"
+                f"{name}.project returns shapes {np.shape(pixels)} and {np.shape(depth)} for {len(x)} "
+                f"points; they must be (2, {len(x)}) and ({len(x)},)"
             )
         off = np.abs(pixels - np.stack([x, y])).max(0)
         off[np.isnan(seen[0])] = 0
@@ -175,8 +175,8 @@ def _checked_rays(projection: Projection, x: Floats, y: Floats, size: Size) -> D
     if lost.any() and (projection.sees_all or not np.isnan(toward[:, lost]).all()):
         at = int(np.flatnonzero(lost)[0])
         raise SceneError(
-            f"{name}.rays returns the direction {toward[:, at].tolist()} for film point ({x[at]:g}, {y[at]:g}); "
-            "where nothing is seen it must be NaN, and sees_all of the class False"
+            f"{name}.rays returns the direction {toward[:, at].tolist()} for film point ({x[at]:g}, "
+            f"{y[at]:g}); where nothing is seen it must be NaN, and sees_all of the class False"
         )
     return toward if offset is None else toward + offset
 
@@ -330,6 +330,9 @@ class Orthographic(Projection):
     def __init__(self, height: float) -> None:
         self.height = number("Camera height", height, lambda x: x > 0, "above 0")
 
+    def check(self, size: Size) -> None:
+        """Check nothing: every point has a ray."""
+
     def scaled(self, factor: float) -> Orthographic:
         """Return the film for a scene whose lengths were multiplied by `factor`."""
         return Orthographic(self.height * factor)
@@ -356,6 +359,9 @@ class Panorama(Projection):
 
     It is the mapping of `wf.Environment`: the render of a camera that looks along +z is an environment.
     """
+
+    def check(self, size: Size) -> None:
+        """Check nothing: every point has a ray."""
 
     def rays(self, x: Floats, y: Floats, size: Size, lens: Floats | None) -> tuple[Floats | None, Floats]:
         """Return directions by longitude, to the right, and latitude, up."""

@@ -61,10 +61,12 @@ class BopLayout:
         Raises
         ------
         SceneError
-            If it has a distortion.
+            If it has a distortion, or is a fisheye camera.
         """
         lens = camera.projection
-        if isinstance(lens, Perspective) and lens.distortion is not None:
+        if not isinstance(lens, Perspective):
+            raise SceneError(f"{name} has a lens {lens!r}; BOP's cameras are perspective ones")
+        if lens.distortion is not None:
             raise SceneError(f"{name} has a lens {lens.distortion!r}; BOP's cameras have no distortion")
 
     def write_view(self, view: DatasetView) -> Any:

@@ -76,9 +76,9 @@ def write_dataset(
     scene, spp
         As for `render`.
     cameras
-        Perspective cameras, one for each view.
+        Perspective or fisheye cameras, one for each view.
     format
-        "coco", "bop", or both. With "bop" cameras have no distortion.
+        "coco", "bop", or both. With "bop" cameras are perspective ones without distortion.
     objects
         Names of the shapes to annotate, for example without the floor; by default all shapes.
     millimeters

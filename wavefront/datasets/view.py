@@ -8,7 +8,7 @@ from typing import Any, TypeAlias
 import numpy as np
 
 from ..arrays.soa import soa
-from ..camera import Camera, Perspective
+from ..camera import Camera, Fisheye, Perspective, Projection
 from ..codecs.display import Display
 from ..image import Image
 from .annotated import AnnotatedObject
@@ -69,22 +69,37 @@ def camera_matrices(camera: Camera, farthest: float) -> dict[str, Any]:
     farthest
         A depth that is greater than that of all points, scene units.
     """
-    whole = pinhole(camera)
-    near = farthest * NEAREST
-    lens = camera.projection.distortion if isinstance(camera.projection, Perspective) else None
+    k = camera.intrinsics("integer")
+    k[:2, 2] -= camera.window[:2]
     return {
         "size": list(camera.size),
         "opencv": {
-            "K": whole.intrinsics("integer").tolist(),
+            "K": k.tolist(),
             "world_to_camera": camera.extrinsics().tolist(),
             "camera_to_world": camera.to_matrix("opencv").tolist(),
-            "distortion": [0.0] * 8 if lens is None else np.asarray(lens.coefficients).tolist(),
+            **_distortion(camera.projection),
         },
         "opengl": {
             "camera_to_world": camera.to_matrix("opengl").tolist(),
             "world_to_camera": np.linalg.inv(camera.to_matrix("opengl")).tolist(),
-            "projection": whole.projection_matrix(near, farthest).tolist(),
-            "near": near,
-            "far": farthest,
+            **_clip(camera, farthest),
         },
     }
+
+
+def _distortion(lens: Projection) -> dict[str, Any]:
+    """Return what a record says of a lens beside K."""
+    if isinstance(lens, Fisheye):
+        numbers = [0.0] * 4 if lens.distortion is None else lens.distortion.tolist()
+        return {"model": "fisheye", "mapping": lens.mapping, "distortion": numbers}
+    known = lens.distortion if isinstance(lens, Perspective) else None
+    return {"distortion": [0.0] * 8 if known is None else np.asarray(known.coefficients).tolist()}
+
+
+def _clip(camera: Camera, farthest: float) -> dict[str, Any]:
+    """Return OpenGL's projection to clip space, which only perspective cameras have."""
+    if not isinstance(camera.projection, Perspective):
+        return {}
+    near = farthest * NEAREST
+    matrix = pinhole(camera).projection_matrix(near, farthest)
+    return {"projection": matrix.tolist(), "near": near, "far": farthest}

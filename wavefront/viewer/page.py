@@ -180,10 +180,10 @@ class Page:
         exposure.on_update(self._on(lambda event: self._show_as(exposure=event.target.value)))
         hints = {"fov": "degrees", "focus": "distance, scene units", "aperture": "diameter, scene units"}
         titles = {"fov": "field of view", "focus": "focus", "aperture": "aperture"}
-        for name, title in titles.items():
+        for name in view.controls:
             low, high = FOV if name == "fov" else view.ranges[name]
             step = 0.5 if name == "fov" else float(f"{(high - low) / STEPS:.1g}")
-            slider = gui.add_slider(title, low, high, step, getattr(view, name), hint=hints[name])
+            slider = gui.add_slider(titles[name], low, high, step, getattr(view, name), hint=hints[name])
             slider.on_update(self._on(partial(self._set_lens, name)))
         save = gui.add_button("save picture")
         save.on_click(self._on(self._save))

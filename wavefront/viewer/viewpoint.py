@@ -9,8 +9,8 @@ from typing import Any
 import numpy as np
 
 from ..arrays.vec import Doubles
-from ..camera import Camera
-from ..camera.projection import Perspective
+from ..camera import Camera, Fisheye
+from ..camera.projection import Orthographic, Panorama, Perspective, Projection
 from ..core.errors import SceneError, finite_array, number
 
 Triple = tuple[float, float, float]
@@ -80,13 +80,15 @@ class Viewpoint:
     focus: float  # scene units
     size: tuple[int, int]  # pixels
     pixels: int  # of a picture, at most
+    other: Projection | None = None  # of a camera that is not perspective
 
     @classmethod
     def of(cls, camera: Camera, bounds: Doubles, up: Doubles) -> Viewpoint:
         """Return that of a camera.
 
-        The target is the point of the view axis that is nearest to the middle of the scene. Cameras that
-        are not perspective are replaced by one that is; lenses are taken without distortion and shift.
+        The target is the point of the view axis that is nearest to the middle of the scene. Orthographic
+        cameras and panoramas are replaced by perspective ones, of which lenses are taken without distortion
+        and shift. Other projections, such as a fisheye, stay.
 
         Parameters
         ----------
@@ -101,7 +103,8 @@ class Viewpoint:
         ahead = -camera.rotation[:, 2]
         distance = float((np.array(around.center) - camera.origin) @ ahead)
         distance = distance if distance > NEAREST * around.radius else around.radius
-        lens = camera.projection if isinstance(camera.projection, Perspective) else Perspective(OTHER_FOV)
+        seen = camera.projection
+        lens = seen if isinstance(seen, Perspective) else Perspective(OTHER_FOV)
         upright = abs(camera.rotation[:, 0] @ up) < UPRIGHT and abs(ahead @ up) < 1 - UPRIGHT
         return cls(
             around,
@@ -113,6 +116,7 @@ class Viewpoint:
             lens.focus if lens.aperture > 0 else float(f"{distance:.3g}"),  # where the page's slider begins
             camera.resolution,
             camera.resolution[0] * camera.resolution[1],
+            None if isinstance(seen, Perspective | Orthographic | Panorama) else seen,
         )
 
     def moved(self, origin: Any, target: Any, up: Any) -> Viewpoint:
@@ -175,7 +179,7 @@ class Viewpoint:
     @property
     def camera(self) -> Camera:
         """The camera."""
-        return Camera.look_at(
+        camera = Camera.look_at(
             self.origin,
             self.target,
             self.up,
@@ -184,10 +188,21 @@ class Viewpoint:
             aperture=self.aperture,
             focus=self.focus,
         )
+        return camera if self.other is None else camera.replace(projection=self.other)
+
+    @property
+    def controls(self) -> tuple[str, ...]:
+        """The parts of the lens that the page may change."""
+        return ("fov", "focus", "aperture") if self.other is None else ()
 
     @property
     def code(self) -> str:
         """The line of Python that makes the camera."""
+        if self.other is not None:
+            return (
+                f"wf.Camera.look_at({self.origin}, {self.target}, up={self.up}, size={self.size})"
+                f".replace(projection={'wf.' * isinstance(self.other, Fisheye)}{self.other!r})"
+            )
         lens = f", aperture={self.aperture!r}, focus={self.focus!r}" if self.aperture > 0 else ""
         return (
             f"wf.Camera.look_at({self.origin}, {self.target}, up={self.up}, fov={self.fov!r}, "
