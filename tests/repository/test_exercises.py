@@ -331,3 +331,29 @@ def test_9_2_a_mesh_in_the_room():
 def test_9_3_a_bsdf_of_ones_own_is_checked():
     report = wf.testing.check_bsdf(wf.Diffuse(0.5), samples=20_000)
     assert all(check.passed for check in report.checks.values())
+
+
+def one_iteration(changes=()):
+    """Return the names of step 10, as far as its scene."""
+    (path,) = FOLDER.glob("10_*.py")
+    names = {}
+    exec(replaced(path, dict(changes)).partition("# %%")[0], names)
+    return names
+
+
+def test_10_1_a_mirror_comes_last():
+    mirror = {"material=wf.Diffuse((0.9, 0.5, 0.2))": "material=wf.Mirror(0.9)"}
+    scene = one_iteration(mirror)["scene"]
+    _, _, compacted, shaded, direct, *_ = wf.trace(scene, max_bounces=1)
+    specular = np.abs(shaded.surface.point[1]) > 1e-3  # the balls; the floor and the lamp are matte
+    specular &= shaded.surface.point[1] < 2.9
+    assert specular[np.argmax(specular) :].all()
+    at = shaded.paths.pixel[specular]
+    np.testing.assert_array_equal(direct.light[:, at], compacted.light[:, at])
+
+
+def test_10_2_roulette_ends_paths_from_the_third_surface_on():
+    steps = list(wf.trace(one_iteration()["scene"], max_bounces=20))
+    left = {step.bounce: len(step.paths) for step in steps if step.stage == "bounce-sample"}
+    onward = {step.bounce - 1: len(step.paths) for step in steps if step.stage == "intersect"}
+    assert [onward[k] == left[k] for k in (0, 1, 2, 3)] == [True, True, False, False]

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from ..arrays.vec import Floats
-from ..core.errors import SceneError, number
+from ..core.errors import SceneError, collect_warnings, number
 from ..core.suggestions import suggests_keywords
 from ..drive.render import render
 
@@ -53,5 +53,7 @@ def bounces(scene: Any, spp: int = 64, most: int = 4, **settings: Any) -> Floats
     last = int(
         number("bounces: most", most, lambda x: x >= 0 and x == int(x), "a whole number of at least 0")
     )
-    pictures = [render(scene, spp, max_bounces=k, **ALONE, **settings).rgb for k in range(last + 1)]
+    with collect_warnings():  # without a light in sight the first picture is black
+        pictures = [render(scene, spp, max_bounces=0, **ALONE, **settings).rgb]
+    pictures += [render(scene, spp, max_bounces=k, **ALONE, **settings).rgb for k in range(1, last + 1)]
     return np.diff(np.stack(pictures), axis=0, prepend=np.zeros((1, *pictures[0].shape), np.float32))
