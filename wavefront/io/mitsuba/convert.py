@@ -6,8 +6,8 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-from ...camera import Sensors, SurfaceSensors
-from ...lights import Environment, Sky
+from ...camera import Camera, Sensors, SurfaceSensors
+from ...lights import Environment, Light, Sky
 from ...scene import Scene
 from ..description.contents import Contents
 from ..description.conversion import only_one, shown
@@ -63,28 +63,16 @@ DEFINED = "bsdf texture sampler film rfilter medium phase volume"  # for others 
 def _scene(entity: Entity) -> Contents:
     job = entity.job
     parts = [part for part in entity.held("shape") if part.type != "shapegroup"]
-    carried = [(sensor, part) for part in parts for sensor in part.held("sensor")]
-    sensors = [(sensor, entity) for sensor in entity.held("sensor")] + carried
-    seen = [(*each, view) for each in sensors if (view := job.convert(each[0])) is not None]
-    for sensor, *_ in seen[1:]:
-        entity.lose(f"the further sensor {sensor.type!r}")
+    seen = _sensors(entity, parts)
     camera, settings = seen[0][2] if seen else (None, {})
-    job.eye = None if camera is None else camera.origin
-    integrators = entity.held("integrator")
-    job.sees_media = not integrators or sees_media(integrators[0])
-    followed = job.convert(integrators[0]) if integrators else {}
-    measures, hides = bool(seen) and (camera is None or isinstance(camera, Sensors)), "background" in followed
-    job.hides_lamps = hides and not measures
-    if hides and measures:
-        entity.lose("hide_emitters for a sensor that measures light")
+    measures = bool(seen) and (camera is None or isinstance(camera, Sensors))
+    followed = _followed(entity, camera, measures)
     found = [shape for part in parts for shape in job.convert(part)]
-    lamps = [part for part in entity.held("emitter") if part.type != "area"]
-    made = [light for part in lamps if (light := job.convert(part)) is not None]
-    lights = [light for each in made for light in (each if isinstance(each, list) else [each])]
-    lights = only_one(lights, job.files.losses)
+    lights = only_one(_lights(entity), job.files.losses)
     found = shown(found, lights, job.files.losses)
     settings = settings | followed
-    if measures or (not hides and any(isinstance(light, Environment | Sky) for light in lights)):
+    around = any(isinstance(light, Environment | Sky) for light in lights)
+    if measures or (around and "background" not in followed):
         settings.pop("background", None)  # alpha is 1
     if seen and camera is None:
         camera = _meter(*seen[0][:2])
@@ -94,6 +82,37 @@ def _scene(entity: Entity) -> Contents:
         camera = camera.above(Scene(found).bounds)
     medium = medium_around(entity, seen[0][0] if seen else None)
     return Contents(lights=lights, camera=camera, shapes=found, settings=settings, medium=medium)
+
+
+def _sensors(entity: Entity, parts: list[Entity]) -> list[tuple[Entity, Entity, Any]]:
+    """Return the sensors of a scene and of its shapes: each with what holds it, its camera and its settings.
+
+    The first one counts.
+    """
+    sensors = [(sensor, part) for part in (entity, *parts) for sensor in part.held("sensor")]
+    seen = [(*each, view) for each in sensors if (view := entity.job.convert(each[0])) is not None]
+    for sensor, *_ in seen[1:]:
+        entity.lose(f"the further sensor {sensor.type!r}")
+    return seen
+
+
+def _followed(entity: Entity, camera: Camera | None, measures: bool) -> dict[str, Any]:
+    """Return the settings of the integrator; what it and the camera see is told to the job."""
+    job = entity.job
+    job.eye = None if camera is None else camera.origin
+    integrators = entity.held("integrator")
+    job.sees_media = not integrators or sees_media(integrators[0])
+    followed: dict[str, Any] = job.convert(integrators[0]) if integrators else {}
+    job.hides_lamps = "background" in followed and not measures
+    if "background" in followed and measures:
+        entity.lose("hide_emitters for a sensor that measures light")
+    return followed
+
+
+def _lights(entity: Entity) -> list[Light]:
+    lamps = [part for part in entity.held("emitter") if part.type != "area"]
+    made = [light for part in lamps if (light := entity.job.convert(part)) is not None]
+    return [light for each in made for light in (each if isinstance(each, list) else [each])]
 
 
 def _meter(sensor: Entity, place: Entity) -> SurfaceSensors | None:

@@ -114,6 +114,13 @@ class Graph:
             return self._nodes[id(source)]
         if len(above) > MAX_DEPTH:
             raise LimitError(f"{place}: plugins refer to each other over more than {MAX_DEPTH} levels")
+        node = self._nodes[id(source)] = self._entity(source, place, path, key, (*above, id(source)))
+        return node
+
+    def _entity(
+        self, source: Mapping[str, Any], place: str, path: str, key: str, above: tuple[int, ...]
+    ) -> Entity:
+        """Return a plugin that is no reference, with all that it holds."""
         kind: str = source["type"]  # as it is called in messages
         own = source.get("id", key)
         own = own if isinstance(own, str) else ""
@@ -127,8 +134,7 @@ class Graph:
                 node.values[str(name)] = value
                 continue
             with self._lost.part(label):
-                inner = "" if _unnamed(name) else str(name)
-                child = self._node(value, f"{path}, {name}", inner, (*above, id(source)))
+                child = self._node(value, f"{path}, {name}", "" if _unnamed(name) else str(name), above)
                 node.size += child.size
                 node.values[str(name)] = child
         if node.size > MOST_PARTS and kind != "scene":
@@ -137,7 +143,6 @@ class Graph:
                 f"the limit is {MOST_PARTS}"
             )
         node.unread.update(node.values)
-        self._nodes[id(source)] = node
         return node
 
     def _target(self, source: Mapping[str, Any], place: str) -> Mapping[str, Any]:
