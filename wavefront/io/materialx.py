@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import operator
 from collections.abc import Callable, Sequence
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -32,7 +32,6 @@ MAX_NODES = 10_000  # of a material, each counted as often as it is referred to
 LEAST_INDEX = 1e-3
 MAX_DEPTH = 32  # of elements in elements
 WRAPS = {"periodic": "repeat", "clamp": "clamp", "mirror": "mirror"}
-NORMALS = ("normalmap", "gltf_normalmap")
 IMAGES = ("image", "tiledimage", "gltf_image", "gltf_colorimage")
 # inputs of OpenPBR that `wf.OpenPBR` does not have
 UNSUPPORTED = (
@@ -118,7 +117,6 @@ def _same(value: Any) -> Any:
     return value
 
 
-KINDS = ("open_pbr_surface", "standard_surface", "gltf_pbr", "UsdPreviewSurface", "disney_principled")
 # functions of each channel, and the names of their arguments
 FUNCTIONS: dict[str, tuple[Callable[..., Any], tuple[str, ...]]] = {
     "add": (operator.add, ("in1", "in2")),
@@ -140,6 +138,16 @@ FUNCTIONS: dict[str, tuple[Callable[..., Any], tuple[str, ...]]] = {
 
 class Lost(Exception):
     """A node that is not supported."""
+
+
+class Wanted(NamedTuple):
+    """A node whose value is wanted."""
+
+    node: Any
+    output: str  # which of its outputs
+    kind: str  # the type of what it is connected to
+    named: str  # the node, for messages
+    value: Callable[[str], Value]  # of an input
 
 
 @suggests_keywords
@@ -267,21 +275,13 @@ class _Document:
         shader: Any = shaders[0] if shaders else None
         kind = None if shader is None else shader.getCategory()
         definition: Any = None if shader is None else shader.getNodeDef()
-        if definition is None or kind not in KINDS:
+        if definition is None or kind not in TRANSLATIONS:
             self._lose(title, "surfaceshader", kind or "no node")
             return OpenPBR(name=title)
         if node.getInput("displacementshader") is not None:
             self._lose(title, "displacementshader", "displacement")
         inputs = {each.getName(): self._input(title, shader, each) for each in definition.getActiveInputs()}
-        if kind == "standard_surface":
-            inputs = self._translated(title, inputs)
-        if kind == "gltf_pbr":
-            inputs = self._of_gltf(title, inputs)
-        if kind == "UsdPreviewSurface":
-            inputs = self._of_usd(title, inputs)
-        if kind == "disney_principled":
-            inputs = self._of_disney(title, inputs)
-        return self._made(title, inputs)
+        return self._made(title, TRANSLATIONS[kind](self, title, inputs))
 
     def _made(self, title: str, inputs: dict[str, Value]) -> Material:
         for name in UNSUPPORTED:
@@ -315,7 +315,7 @@ class _Document:
         except SceneError as error:  # of values together
             raise SceneError(f"{self.name}: material {title!r}: {error}") from error
 
-    def _translated(self, title: str, inputs: dict[str, Value]) -> dict[str, Value]:
+    def _of_standard(self, title: str, inputs: dict[str, Value]) -> dict[str, Value]:
         """Return the inputs of OpenPBR for those of standard surface, by the library's graph."""
         graph = self.standard.getNodeGraph("NG_standard_surface_to_open_pbr_surface")
         made = {}
@@ -425,31 +425,29 @@ class _Document:
             return self._value(given, given.getType(), interface, depth)
 
         try:
-            if category in NORMALS:
-                return self._normal(node, category, value)
-            if category in IMAGES:
-                channel = 3 if output == "outa" else 0 if kind == "float" else None
-                return self._image(node, channel, value)
-            if category == "separate3":
-                source = node.getInput("in").getConnectedNode()
-                if source is None or source.getCategory() not in IMAGES:
-                    raise Lost(named)
-                channel = {"outx": 0, "outr": 0, "outy": 1, "outg": 1, "outz": 2, "outb": 2}[output]
-                return self._image(source, channel, lambda name: _plain(source.getInput(name)))
             if category in FUNCTIONS:
                 function, names = FUNCTIONS[category]
                 return _combined(function, [value(name) for name in names])
-            if category == "convert":
-                return _converted(value("in"), kind, named)
-            if category == "dotproduct":
-                return float(np.dot(_number(value("in1")), _number(value("in2"))))
-            if category == "extract":
-                return float(_number(value("in"))[int(value("index"))])
+            if category in NODES:
+                return NODES[category](self, Wanted(node, output, kind, named, value))
         except (ValueError, IndexError, TypeError, AttributeError, ArithmeticError) as error:
             if isinstance(error, SceneError):
                 raise
             raise Lost(f"{named}: {error}") from error
         raise Lost(named)
+
+    def _colors(self, wanted: Wanted) -> Texture:
+        """Return an image, or one channel of it."""
+        channel = 3 if wanted.output == "outa" else 0 if wanted.kind == "float" else None
+        return self._image(wanted.node, channel, wanted.value)
+
+    def _separated(self, wanted: Wanted) -> Texture:
+        """Return a channel of an image."""
+        source = wanted.node.getInput("in").getConnectedNode()
+        if source is None or source.getCategory() not in IMAGES:
+            raise Lost(wanted.named)
+        channel = {"outx": 0, "outr": 0, "outy": 1, "outg": 1, "outz": 2, "outb": 2}[wanted.output]
+        return self._image(source, channel, lambda name: _plain(source.getInput(name)))
 
     def _image(self, node: Any, channel: int | None, value: Callable[[str], Value]) -> Texture:
         file = node.getInput("file")
@@ -482,11 +480,12 @@ class _Document:
             channel=channel,
         )
 
-    def _normal(self, node: Any, category: str, value: Callable[[str], Value]) -> NormalMap:
-        image = self._image(node, None, value) if category == "gltf_normalmap" else value("in")
+    def _normal(self, wanted: Wanted) -> NormalMap:
+        whole = wanted.node.getCategory() == "gltf_normalmap"
+        image = self._image(wanted.node, None, wanted.value) if whole else wanted.value("in")
         if not isinstance(image, Texture):
-            raise Lost(f"normalmap {node.getName()!r}")
-        scale = np.ravel(value("scale")) if category == "normalmap" else np.ones(1)
+            raise Lost(f"normalmap {wanted.node.getName()!r}")
+        scale = np.ones(1) if whole else np.ravel(wanted.value("scale"))
         return NormalMap(image, float(scale[0]))
 
     def _lose(self, material: str, name: str, what: str) -> None:
@@ -520,8 +519,37 @@ def _combined(function: Callable[..., Any], parts: list[Value]) -> Value:
     return parts[0] if function is _same else computed(function, *known, rising=False)
 
 
-def _converted(value: Value, kind: str, named: str) -> Value:
+def _converted(document: _Document, wanted: Wanted) -> Value:
     """Return a number or a color as a type."""
-    if isinstance(value, BaseTexture) or np.ndim(value) or kind == "float":
+    value = wanted.value("in")
+    if isinstance(value, BaseTexture) or np.ndim(value) or wanted.kind == "float":
         return value
-    return np.full(2 if kind == "vector2" else 3, value, f4)
+    return np.full(2 if wanted.kind == "vector2" else 3, value, f4)
+
+
+def _dot(document: _Document, wanted: Wanted) -> float:
+    return float(np.dot(_number(wanted.value("in1")), _number(wanted.value("in2"))))
+
+
+def _extracted(document: _Document, wanted: Wanted) -> float:
+    return float(_number(wanted.value("in"))[int(wanted.value("index"))])
+
+
+# how each kind of surface becomes inputs of OpenPBR
+TRANSLATIONS: dict[Any, Callable[[_Document, str, dict[str, Value]], dict[str, Value]]] = {
+    "open_pbr_surface": lambda document, title, inputs: inputs,
+    "standard_surface": _Document._of_standard,
+    "gltf_pbr": _Document._of_gltf,
+    "UsdPreviewSurface": _Document._of_usd,
+    "disney_principled": _Document._of_disney,
+}
+# what becomes of nodes that are no functions of each channel
+NODES: dict[str, Callable[[_Document, Wanted], Value]] = {
+    **dict.fromkeys(IMAGES, _Document._colors),
+    "normalmap": _Document._normal,
+    "gltf_normalmap": _Document._normal,
+    "separate3": _Document._separated,
+    "convert": _converted,
+    "dotproduct": _dot,
+    "extract": _extracted,
+}
