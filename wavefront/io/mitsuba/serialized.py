@@ -57,21 +57,7 @@ def read_serialized(name: str, data: bytes, index: int, files: SceneFiles) -> Ra
     SceneError
         If the file is malformed, or its header claims more than the limits allow.
     """
-    if len(data) < 8:
-        raise SceneError(f"{name}: has {len(data)} bytes, too few for a serialized mesh")
-    magic, version = struct.unpack_from("<HH", data)
-    if magic != MAGIC or version not in (3, 4):
-        raise SceneError(f"{name}: is no serialized mesh of version 3 or 4: it begins with {data[:4].hex()}")
-    (count,) = struct.unpack_from("<I", data, len(data) - 4)
-    width = 4 if version == 3 else 8
-    begin = 0
-    if index:
-        at = len(data) - 4 - width * (count - index)
-        if index >= count or not at >= 4:
-            raise SceneError(f"{name}: shape_index is {index}; the file has {count} meshes")
-        (begin,) = struct.unpack_from("<I" if version == 3 else "<Q", data, at)
-        if begin + 4 > len(data):
-            raise SceneError(f"{name}: mesh {index} begins at byte {begin}; the file has {len(data)}")
+    version, begin = _found(name, data, index)
     stream = _Stream(name, data[begin + 4 :])
     (flags,) = struct.unpack("<I", stream.read(4))
     label = b""
@@ -87,3 +73,23 @@ def read_serialized(name: str, data: bytes, index: int, files: SceneFiles) -> Ra
     colors = stream.rows(vertices, 3, kind) if flags & COLORS else None
     corners = np.frombuffer(stream.read(12 * faces), "<u4").reshape(-1, 3).astype(np.intp)
     return RawMesh(label.decode("utf-8", "replace"), points, corners, normals, uvs, colors=colors)
+
+
+def _found(name: str, data: bytes, index: int) -> tuple[int, int]:
+    """Return the version of a file, and the byte where a mesh begins."""
+    if len(data) < 8:
+        raise SceneError(f"{name}: has {len(data)} bytes, too few for a serialized mesh")
+    magic, version = struct.unpack_from("<HH", data)
+    if magic != MAGIC or version not in (3, 4):
+        raise SceneError(f"{name}: is no serialized mesh of version 3 or 4: it begins with {data[:4].hex()}")
+    (count,) = struct.unpack_from("<I", data, len(data) - 4)
+    width = 4 if version == 3 else 8
+    begin = 0
+    if index:
+        at = len(data) - 4 - width * (count - index)
+        if index >= count or not at >= 4:
+            raise SceneError(f"{name}: shape_index is {index}; the file has {count} meshes")
+        (begin,) = struct.unpack_from("<I" if version == 3 else "<Q", data, at)
+        if begin + 4 > len(data):
+            raise SceneError(f"{name}: mesh {index} begins at byte {begin}; the file has {len(data)}")
+    return version, begin

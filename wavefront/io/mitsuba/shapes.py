@@ -111,16 +111,9 @@ def _cylinder(entity: Entity) -> list[Shape]:
     "sphere", "shape", f"{SURFACE} center radius", PARTS, note="one radius; a mesh where its front is inside"
 )
 def _sphere(entity: Entity) -> list[Shape]:
-    center = entity.vector("center", (0, 0, 0))
-    radius = entity.number("radius", 1.0, ABOVE_0)
-    matrix = to_world(entity)
-    scale = np.linalg.svd(matrix[:3, :3], compute_uv=False)
-    if scale[0] - scale[2] > ROUND * scale[0]:
-        entity.lose("to_world, which scales unevenly")
+    center, radius, matrix = _placed_ball(entity)
     mirrored = bool(np.linalg.det(matrix[:3, :3]) < 0)
     inward = entity.flag("flip_normals") != mirrored  # a reflection turns the normals, but of no other shape
-    center = matrix[:3, :3] @ center + matrix[:3, 3]
-    radius *= float(np.linalg.norm(matrix[:3, 0]))
     closed = entity.job.eye is None or bool(np.linalg.norm(entity.job.eye - center) > radius)
     material, emission = _appearance(entity, closed and not inward)
     turn = None
@@ -128,21 +121,31 @@ def _sphere(entity: Entity) -> list[Shape]:
         material, emission = _for_spheres(material, emission, entity.job)
         left, _, right = np.linalg.svd(matrix[:3, :3])
         turn = left @ right @ POLES
-    improper = turn is not None and mirrored
+    improper, name = turn is not None and mirrored, entity.name or "sphere"
     made = Sphere(
         center,
         radius,
         material=material,
         emission=emission,
         transform=None if improper else turn,
-        name=entity.name or "sphere",
+        name=name,
     )
     if not (inward or improper or (emission is not None and material.opacity is not None)):
         return [made]
     raw = facing(ball(made, turn), reverse=inward)
-    raw = replace(raw, name=made.name, material=material, emission=emission)
-    mesh = build(entity.job.name, raw, entity.job.files.losses)
-    return [] if mesh is None else [mesh]
+    return _built(entity, replace(raw, name=name, material=material, emission=emission))
+
+
+def _placed_ball(entity: Entity) -> tuple[Doubles, float, Matrix]:
+    """Return the center and the radius of a sphere in the scene, and its transform."""
+    center = entity.vector("center", (0, 0, 0))
+    radius = entity.number("radius", 1.0, ABOVE_0)
+    matrix = to_world(entity)
+    scale = np.linalg.svd(matrix[:3, :3], compute_uv=False)
+    if scale[0] - scale[2] > ROUND * scale[0]:
+        entity.lose("to_world, which scales unevenly")
+    center = matrix[:3, :3] @ center + matrix[:3, 3]
+    return center, radius * float(np.linalg.norm(matrix[:3, 0])), matrix
 
 
 @plugin("obj ply", "shape", f"{SURFACE} filename face_normals flip_tex_coords", PARTS)
@@ -218,8 +221,12 @@ def _mesh(entity: Entity, raw: RawMesh, of_file: bool = False, closed: bool = Fa
     if raw.uvs is None and {"uv", "tangent_frame"} & _reads((material, emission)):
         raw = with_corner_uvs(raw, CORNERS)
     name = entity.name or raw.name
-    raw = replace(raw, name=name, material=material, emission=emission)
-    mesh = build(entity.job.name, raw, entity.job.files.losses)
+    return _built(entity, replace(raw, name=name, material=material, emission=emission))
+
+
+def _built(entity: Entity, raw: RawMesh) -> list[Shape]:
+    """Return the mesh of a shape; nothing where it has no faces."""
+    mesh = build(entity.job.name, raw, entity.lost)
     return [] if mesh is None else [mesh]
 
 
@@ -268,15 +275,7 @@ def _appearance(entity: Entity, closed: bool = False, bent: bool = False) -> tup
     bsdfs, emitters = entity.held("bsdf"), entity.held("emitter")
     for extra in (*bsdfs[1:], *emitters[1:]):
         entity.lose(f"a second {extra.kind}")
-    emission = None
-    if (
-        emitters
-        and TABLE.find("emitter", emitters[0].type).convert is not None
-        and emitters[0].type != "area"
-    ):
-        entity.lose(f"the emitter {emitters[0].type!r}, which is no area light")
-    elif emitters:
-        emission = entity.job.convert(emitters[0])
+    emission = _emission(entity, emitters[0]) if emitters else None
     if not bsdfs:
         material = entity.job.made.setdefault(not emitters, Material(Diffuse(0 if emitters else 0.5)))
         one_sided = not emitters
@@ -296,6 +295,14 @@ def _appearance(entity: Entity, closed: bool = False, bent: bool = False) -> tup
     if emitters and entity.job.hides_lamps:
         material = entity.job.changed(material, visible_to_camera=False)
     return material, emission
+
+
+def _emission(entity: Entity, emitter: Entity) -> Any:
+    """Return the radiance of a shape; None if what it holds is no area light."""
+    if emitter.type != "area" and TABLE.find("emitter", emitter.type).convert is not None:
+        entity.lose(f"the emitter {emitter.type!r}, which is no area light")
+        return None
+    return entity.job.convert(emitter)
 
 
 def _shining(alpha: Any, emission: Any) -> tuple[Any, Any]:

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
+from ...arrays.vec import Doubles
 from ...camera import Camera
-from ...camera.projection import Orthographic, Panorama, Perspective, Projection
+from ...camera.projection import Orthographic, Panorama, Perspective
 from ...core.errors import SceneError, exact
 from ...sampling.filters import GaussianFilter
 from ...shapes.transform import Matrix
@@ -45,41 +46,56 @@ def _spherical(entity: Entity) -> Camera:
     return Camera(matrix[:3, 3], np.stack([-z, y, x], 1), Panorama(), size, crop)
 
 
-@converts("camera", "perspective orthographic realistic", harmless="shutteropen shutterclose")
-def _camera(entity: Entity) -> Camera:
-    """Return a camera for the size and the crop of the film."""
-    (width, height), crop = entity.job.film
-    x0, x1, y0, y1 = _window(entity, width / height)
+class View(NamedTuple):
+    """Where a camera stands, and the part of its screen that the film shows."""
+
+    origin: Doubles
+    axes: Doubles  # (3, 3)
+    scale: Doubles  # (3,) of lengths along these
+    window: tuple[float, ...]  # left, right, lower and upper edge
+    pixel: float  # the width of a pixel over its height
+    film: Any  # size and crop
+
+
+def _view(entity: Entity) -> View:
+    (width, height), _ = film = entity.job.film
+    x0, x1, y0, y1 = window = _window(entity, width / height)
     matrix = entity.job.world @ entity.matrix
     scale = np.linalg.norm(matrix[:3, :3], axis=0)
     if np.ptp(scale) > TALL * scale.max():
         entity.lose("a transform that scales unevenly")
-    axes, origin = matrix[:3, :3] / scale * (1, 1, -1), matrix[:3, 3]
-    lens: Projection
-    shape = (x1 - x0) / width / ((y1 - y0) / height)  # of a pixel
+    pixel = (x1 - x0) / width / ((y1 - y0) / height)
+    return View(matrix[:3, 3], matrix[:3, :3] / scale * (1, 1, -1), scale, window, pixel, film)
+
+
+@converts("camera", "orthographic", harmless="shutteropen shutterclose focaldistance")
+def _orthographic(entity: Entity) -> Camera:
+    origin, axes, scale, (x0, x1, y0, y1), pixel, film = _view(entity)
     radius = entity.number("lensradius", 0.0)
-    if entity.type == "orthographic":
-        lens = Orthographic((y1 - y0) * scale[1])
-        origin = origin + axes[:, 0] * (x0 + x1) / 2 * scale[0] + axes[:, 1] * (y0 + y1) / 2 * scale[1]
-        entity.harmless("focaldistance")
-        if abs(shape - 1) > TALL:
-            entity.lose("pixels that are not square")
-        if radius:
-            entity.lose("lensradius")
-    else:
-        if entity.type != "perspective":
-            entity.lose("a perspective camera in its place")
-        angle = entity.number("fov", 90.0, BELOW_180)
-        half = half_tangent(angle) * (y1 - y0) / 2
-        distance = entity.number("focaldistance", 1e6)
-        lens = Perspective(
-            angle_of(half),
-            shift=((x0 + x1) / 2 / (x1 - x0), (y0 + y1) / 2 / (y1 - y0)),
-            pixel_aspect=shape,
-            aperture=2 * radius * scale[0],
-            focus=distance * scale[2] if radius else None,
-        )
-    return Camera(origin, axes, lens, (width, height), crop)
+    origin = origin + axes[:, 0] * (x0 + x1) / 2 * scale[0] + axes[:, 1] * (y0 + y1) / 2 * scale[1]
+    if abs(pixel - 1) > TALL:
+        entity.lose("pixels that are not square")
+    if radius:
+        entity.lose("lensradius")
+    return Camera(origin, axes, Orthographic((y1 - y0) * scale[1]), *film)
+
+
+@converts("camera", "perspective realistic", harmless="shutteropen shutterclose")
+def _perspective(entity: Entity) -> Camera:
+    origin, axes, scale, (x0, x1, y0, y1), pixel, film = _view(entity)
+    radius = entity.number("lensradius", 0.0)
+    if entity.type != "perspective":
+        entity.lose("a perspective camera in its place")
+    half = half_tangent(entity.number("fov", 90.0, BELOW_180)) * (y1 - y0) / 2
+    distance = entity.number("focaldistance", 1e6)
+    lens = Perspective(
+        angle_of(half),
+        shift=((x0 + x1) / 2 / (x1 - x0), (y0 + y1) / 2 / (y1 - y0)),
+        pixel_aspect=pixel,
+        aperture=2 * radius * scale[0],
+        focus=distance * scale[2] if radius else None,
+    )
+    return Camera(origin, axes, lens, *film)
 
 
 def _window(entity: Entity, aspect: float) -> tuple[float, ...]:
