@@ -39,6 +39,12 @@ def retype(entity: Entity, type: str) -> None:
     entity.title = f"{entity.variant} {entity.kind} {type!r}{named}".lstrip()
 
 
+def placement(entity: Entity) -> Matrix:
+    """Return the matrix of an entity to the scene."""
+    matrix: Matrix = entity.job.world @ entity.matrix
+    return matrix
+
+
 def values_of(given: Parameter) -> Any:
     """Return the values of a parameter: (n,) numbers, rows (n, k) of vectors or colors, or a list."""
     if given.type == "bool":

@@ -19,17 +19,22 @@ from ..description.conversion import only_one
 from ..description.entity import CONE, Entity, Limit
 from ..description.views import angle_of, half_tangent
 from ..losses import Losses
-from .entities import converts, spectrum
+from .entities import converts, placement, spectrum
 
 ROWS = 64  # of an environment that are looked up at once
 MOST_ANGLES = 1024  # of the table of a point light, from pole to pole
 SUBPIXELS = 2  # of its pixels, in both directions
 
 
+def _factor(entity: Entity) -> float:
+    """Return the scale of a light times the exposure of the film."""
+    return entity.number("scale", 1.0) * float(entity.job.exposure)
+
+
 def _strength(entity: Entity, name: str) -> Doubles:
     """Return a color times the scale of a light and the exposure of the film, (3,)."""
     color = np.broadcast_to(spectrum(entity, name, 1.0, "light"), 3)
-    return np.asarray(color * (entity.number("scale", 1.0) * entity.job.exposure))
+    return np.asarray(color * _factor(entity))
 
 
 def _measured(entity: Entity, name: str, own: float) -> float:
@@ -40,7 +45,7 @@ def _measured(entity: Entity, name: str, own: float) -> float:
 
 def _points(entity: Entity) -> tuple[Doubles, Doubles]:
     """Return "from" and "to" in the scene, (3,) each."""
-    matrix = entity.job.world @ entity.matrix
+    matrix = placement(entity)
     ends = [entity.vector(name, default) for name, default in (("from", (0.0, 0, 0)), ("to", (0.0, 0, 1)))]
     start, end = (matrix[:3, :3] @ point + matrix[:3, 3] for point in ends)
     return start, end
@@ -55,7 +60,7 @@ def _point(entity: Entity) -> PointLight:
 @converts("light", "goniometric")
 def _goniometric(entity: Entity) -> PointLight | WebLight:
     """Return a point whose intensity by direction is that of an equal-area image; its pole is y."""
-    matrix, strength = entity.job.world @ entity.matrix, _strength(entity, "I")
+    matrix, strength = placement(entity), _strength(entity, "I")
     if not entity.text("filename", ""):
         return PointLight(matrix[:3, 3], strength * _measured(entity, "power", 4 * np.pi))
     factors = _square(entity).mean(2, keepdims=True)
@@ -91,7 +96,7 @@ def _spot(entity: Entity) -> SpotLight:
 
 @converts("light", "projection")
 def _projection(entity: Entity) -> Projector:
-    slide, matrix = _pixels(entity), entity.job.world @ entity.matrix
+    slide, matrix = _pixels(entity), placement(entity)
     height, width = slide.shape[:2]
     if np.linalg.det(matrix[:3, :3]) > 0:  # pbrt's x is to the right in a space that is left-handed
         slide = slide[:, ::-1]
@@ -101,7 +106,7 @@ def _projection(entity: Entity) -> Projector:
     return Projector(
         matrix[:3, 3],
         Texture(np.ascontiguousarray(slide)),
-        entity.number("scale", 1.0) * entity.job.exposure * _measured(entity, "power", power),
+        _factor(entity) * _measured(entity, "power", power),
         direction=matrix[:3, 2],
         fov=angle_of(half),
         up=matrix[:3, 1],
@@ -126,8 +131,8 @@ def _infinite(entity: Entity) -> Environment:
     at = (np.arange(size) + 0.5) / size
     upward = np.maximum(square_to_sphere(*np.meshgrid(at, at))[2], 0)
     own = float((luminance(pixels.transpose(2, 0, 1)) * upward).mean() * 2 * np.pi)
-    factor = entity.number("scale", 1.0) * entity.job.exposure * _measured(entity, "illuminance", own)
-    axes = (entity.job.world @ entity.matrix)[:3, :3]
+    factor = _factor(entity) * _measured(entity, "illuminance", own)
+    axes = placement(entity)[:3, :3]
     if not np.linalg.svd(axes, compute_uv=False)[2] > 1e-12 * np.abs(axes).max():
         raise SceneError(f"the transform of its directions is singular: {axes.tolist()}")
     to_light = np.asarray(np.linalg.inv(axes), np.float64)
@@ -152,7 +157,7 @@ def _area(entity: Entity) -> tuple[Any, float, bool]:
     if not entity.text("filename", ""):
         radiance = _strength(entity, "L")
         return radiance, float(luminance(np.broadcast_to(spectrum(entity, "L", 1.0, "light"), 3))), sides
-    pixels, factor = _pixels(entity), entity.number("scale", 1.0) * entity.job.exposure
+    pixels, factor = _pixels(entity), _factor(entity)
     return Texture(pixels, wrap="clamp", scale=factor), float(luminance(pixels.mean((0, 1)))), sides
 
 

@@ -13,6 +13,7 @@ from ...arrays.vec import Doubles, Ints
 from ...core.errors import SceneError
 from ...textures.image import Texture
 from ..description.entity import Entity
+from .entities import placement
 
 TURN = 2 * np.pi
 
@@ -65,7 +66,7 @@ def mapping_of(entity: Entity) -> Mapping:
         scale_u, scale_v = (entity.number(name, 1.0) for name in ("uscale", "vscale"))
         rows = [scale_u, 0, _shift(entity, "u")], [0, scale_v, _shift(entity, "v")], [0, 0, 1]
         return Mapping(np.array(rows))
-    matrix = entity.job.world @ entity.matrix
+    matrix = placement(entity)
     if not np.linalg.cond(matrix[:3, :3]) < 1e12:
         raise SceneError(f"the transform of its mapping is singular: {matrix[:3, :3].tolist()}")
     inverse = np.asarray(np.linalg.inv(matrix), np.float64)

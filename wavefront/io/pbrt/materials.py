@@ -32,7 +32,7 @@ from ..description.appearance import null_surface
 from ..description.computed import Value, at_least, clipped, computed
 from ..description.conversion import GRAY
 from ..description.entity import Entity
-from .entities import NAMED, converts, spectrum, unsupported
+from .entities import NAMED, converts, placement, spectrum, unsupported
 from .textures import color, fourth_root, scalar, square_root
 
 LEAST_INDEX = 1e-6
@@ -271,7 +271,7 @@ def _placed(entity: Entity) -> dict[str, Any]:
     box = np.diag([*(high - low), 1.0])
     box[:3, 3] = low
     phase, scale = HenyeyGreenstein(entity.number("g", 0.0)), entity.number("scale", 1.0)
-    return {"transform": entity.job.world @ entity.matrix @ box, "phase": phase, "scale": scale}
+    return {"transform": placement(entity) @ box, "phase": phase, "scale": scale}
 
 
 def _voxels(entity: Entity, name: str, kind: str) -> Any:

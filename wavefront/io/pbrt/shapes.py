@@ -21,7 +21,7 @@ from ..description.placing import facing, in_range, moved_raw
 from ..repair import RawMesh, build, existing, with_corner_uvs, with_corners_apart
 from ..surfaces import RINGS, SIDES, over_square
 from ..trimesh_library import import_trimesh
-from .entities import Job, converts, unsupported
+from .entities import Job, converts, placement, unsupported
 from .mappings import Mapped, Mapping
 from .materials import material_of
 from .textures import scalar
@@ -168,8 +168,8 @@ def _rows(entity: Entity, name: str, rows: Doubles | None, count: int) -> Double
 
 def place(entity: Entity) -> list[Shape]:
     """Return a shape where it stands in the scene."""
-    with entity.job.files.losses.part(entity.label), placed(entity.label):
-        return _shapes(entity, entity.job.world @ entity.matrix, entity.state.area)
+    with entity.lost.part(entity.label), placed(entity.label):
+        return _shapes(entity, placement(entity), entity.state.area)
     return []
 
 
@@ -182,7 +182,7 @@ def place_object(entities: Sequence[Entity], job: Job, matrices: Matrix) -> list
             job.count_instances(len(matrices))
             if entity.state.area is not None:
                 entity.lose("the light of a shape in an object")
-            made = _shapes(entity, job.world @ entity.matrix, None, even)
+            made = _shapes(entity, placement(entity), None, even)
             if any(_mappings(shape.material) for shape in made):
                 entity.lose("where its instances are; all have the texture coordinates of the object")
             shapes += made
@@ -227,7 +227,7 @@ def _mesh(entity: Entity, matrix: Matrix, light: Entity | None) -> Mesh | None:
     entity.job.count(raw.faces)
     raw.material = material_of(entity, _opacity(entity, light))
     raw.emission, raw.two_sided = _emission(light, area)
-    return build(entity.place, _with_coordinates(entity, raw), entity.job.files.losses)
+    return build(entity.place, _with_coordinates(entity, raw), entity.lost)
 
 
 def _with_coordinates(entity: Entity, raw: RawMesh) -> RawMesh:

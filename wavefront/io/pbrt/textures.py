@@ -14,7 +14,7 @@ from ...textures.base import BaseTexture
 from ...textures.image import UV_SETS, StoredImage, Texture
 from ..description.computed import Computed, Value, computed, limits_of, product
 from ..description.entity import Entity
-from .entities import converts, spectrum, unsupported
+from .entities import converts, placement, spectrum, unsupported
 from .mappings import Mapped, MappedTexture, Mapping, mapping_of
 from .noise import noise
 
@@ -153,7 +153,7 @@ def _dots(entity: Entity) -> Value:
 @converts("texture", "directionmix")
 def _direction_mix(entity: Entity) -> Value:
     one, two = (part(entity, f"tex{i}", i - 1.0) for i in (1, 2))
-    direction = (entity.job.world @ entity.matrix)[:3, :3] @ entity.vector("dir", (0.0, 1.0, 0.0))
+    direction = placement(entity)[:3, :3] @ entity.vector("dir", (0.0, 1.0, 0.0))
     size = np.linalg.norm(direction)
     if not size > 0:
         raise SceneError("dir must not be zero")

@@ -14,7 +14,7 @@ from ...sampling.filters import GaussianFilter
 from ...shapes.transform import Matrix
 from ..description.entity import ABOVE_0, BELOW_180, Entity
 from ..description.views import angle_of, filter_setting, half_tangent
-from .entities import converts, unsupported
+from .entities import converts, placement, unsupported
 
 Settings = dict[str, Any]
 TALL = 1e-3  # relative difference of a pixel's sides that is taken for rounding
@@ -41,7 +41,7 @@ def _spherical(entity: Entity) -> Camera:
     if entity.choice("mapping", "equalarea", ("equalarea", "equirectangular")) == "equalarea":
         entity.lose("mapping 'equalarea'; 'equirectangular' in its place")
     size, crop = entity.job.film
-    matrix = entity.job.world @ entity.matrix
+    matrix = placement(entity)
     x, y, z = (matrix[:3, i] / np.linalg.norm(matrix[:3, i]) for i in range(3))
     return Camera(matrix[:3, 3], np.stack([-z, y, x], 1), Panorama(), size, crop)
 
@@ -60,7 +60,7 @@ class View(NamedTuple):
 def _view(entity: Entity) -> View:
     (width, height), _ = film = entity.job.film
     x0, x1, y0, y1 = window = _window(entity, width / height)
-    matrix = entity.job.world @ entity.matrix
+    matrix = placement(entity)
     scale = np.linalg.norm(matrix[:3, :3], axis=0)
     if np.ptp(scale) > TALL * scale.max():
         entity.lose("a transform that scales unevenly")
