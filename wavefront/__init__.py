@@ -41,6 +41,7 @@ if TYPE_CHECKING:
     from .core.errors import Interrupted, RenderError, SaveError, SceneError
     from .datasets import write_dataset
     from .drive import Session, program
+    from .drive.frames import render_frames
     from .drive.render import render
     from .extensions import (
         register_accelerator,
@@ -166,6 +167,7 @@ _HOMES = {  # of the public names: a module is imported when one of its names is
     ".core.errors": "Interrupted RenderError SaveError SceneError",
     ".datasets": "write_dataset",
     ".drive": "Session program",
+    ".drive.frames": "render_frames",
     ".drive.render": "render",
     ".extensions": (
         "register_accelerator register_executor register_filter register_format "
@@ -354,6 +356,7 @@ __all__ = [
     "register_light_sampler",
     "register_sampler",
     "render",
+    "render_frames",
     "render_many",
     "save_animation",
     "srgb",

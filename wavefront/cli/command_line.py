@@ -14,6 +14,7 @@ from typing import Any
 from ..core.errors import RenderError, SceneError
 from ..core.interrupt import endings_as_ctrl_c
 from ..version import VERSION
+from .animate_command import add_animate_command
 from .command import COMMAND, Parser, add_command
 from .doctor_command import add_doctor_command
 from .info_command import add_info_command
@@ -69,6 +70,7 @@ def parser() -> argparse.ArgumentParser:
     commands = top.add_subparsers(required=True, metavar=COMMAND)
     add_render_command(commands)
     add_turntable_command(commands)
+    add_animate_command(commands)
     add_view_command(commands)
     add_dataset_command(commands)
     add_measure_command(commands)

@@ -265,12 +265,21 @@ def add_reading(command: argparse.ArgumentParser) -> None:
         metavar="FOLDER",
         help="folder, beside its own, whose files the scene may refer to; can be given several times",
     )
+    command.add_argument("--time", type=_finite, metavar="SECONDS", help="moment of a file that moves")
+    command.add_argument("--animation", metavar="NAME", help="which of its animations, by name or number")
 
 
 def reading(options: argparse.Namespace) -> dict[str, Any]:
     """Return the options of reading a scene file, as arguments of `load`."""
     folders = [os.path.join(getattr(options, "folder", None) or "", each) for each in options.search_path]
-    return {"parameters": dict(options.define), "search_paths": folders}
+    moving = {"time": getattr(options, "time", None), "animation": _name_or_number(options)}
+    return {"parameters": dict(options.define), "search_paths": folders, **moving}
+
+
+def _name_or_number(options: argparse.Namespace) -> str | int | None:
+    """Return which animation is wanted; what is a number is one."""
+    wanted = getattr(options, "animation", None)
+    return int(wanted) if wanted is not None and wanted.isdecimal() else wanted
 
 
 def definition(text: str) -> tuple[str, str]:

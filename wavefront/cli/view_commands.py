@@ -50,13 +50,13 @@ def add_turntable_command(commands: Any) -> None:
     )
     command.add_argument("--frames", type=count, default=60, help="pictures of a whole turn")
     command.add_argument("--fps", type=float, default=24.0, help="pictures per second")
-    _add_settings_of_series(command)
+    add_settings_of_series(command)
     command.set_defaults(run=_turntable)
 
 
 def _turntable(options: argparse.Namespace) -> int:
     check_animation(options.output)
-    display = _display(options)
+    display = checked_display(options)
     scene, cameras, settings = _series(options, options.frames)
     images = render_many(scene, cameras, **settings)
     written = save_animation(options.output, images, fps=options.fps, **display)
@@ -96,12 +96,12 @@ def add_dataset_command(commands: Any) -> None:
     command.add_argument(
         "--depth-scale", type=float, help="millimeters of a code of BOP's depth (default: 0.1 or more)"
     )
-    _add_settings_of_series(command)
+    add_settings_of_series(command)
     command.set_defaults(run=_dataset)
 
 
 def _dataset(options: argparse.Namespace) -> int:
-    display = _display(options)
+    display = checked_display(options)
     scene, cameras, settings = _series(options, options.views)
     rendered = write_dataset(
         options.output,
@@ -120,13 +120,14 @@ def _dataset(options: argparse.Namespace) -> int:
     return 0
 
 
-def _add_settings_of_series(command: argparse.ArgumentParser) -> None:
+def add_settings_of_series(command: argparse.ArgumentParser) -> None:
+    """Add the options of commands that render several pictures."""
     add_settings(command)
     add_display(command)
     command.add_argument("--quiet", action="store_true", help="no progress bar")
 
 
-def _display(options: argparse.Namespace) -> dict[str, Any]:
+def checked_display(options: argparse.Namespace) -> dict[str, Any]:
     """Return how pictures are shown, checked before anything is rendered."""
     display = display_values(options)
     Display(**display)

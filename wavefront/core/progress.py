@@ -28,14 +28,21 @@ class Bar:
         Time limit; if given, progress counts seconds in place of samples.
     end
         How the render ends if the number of samples is not known before. A bar shows it in place of a total.
+    unit
+        What is counted, if not samples.
     """
 
     def __init__(
-        self, progress: Progress, samples: int, seconds: float | None, end: str | None = None
+        self,
+        progress: Progress,
+        samples: int,
+        seconds: float | None,
+        end: str | None = None,
+        unit: str = "sample",
     ) -> None:
         self._callback = progress if callable(progress) else None
         self._wanted = progress is None or progress is True
-        self._timed, self._end = seconds is not None, end
+        self._timed, self._end, self._unit = seconds is not None, end, unit
         self._total = samples if seconds is None else seconds
         self._done: float = 0
         self._told: float = 0  # time of the last report, in seconds
@@ -75,12 +82,12 @@ class Bar:
     def _appear(self, elapsed: float) -> Any:
         from tqdm import tqdm  # imported here, to keep start-up and short renders quick
 
-        style: dict[str, Any] = {"unit_scale": True}
+        style: dict[str, Any] = {"unit_scale": self._unit == "sample"}
         if self._timed:
             style = {"bar_format": "{l_bar}{bar}| {n:.0f}/{total:.0f} s{postfix}"}
         if self._end is not None:
             style["bar_format"] = "{n_fmt} samples [{elapsed}, {rate_fmt}{postfix}] " + f"ends {self._end}"
-        bar = tqdm(total=self._total, initial=self._done, unit="sample", file=_Screen(), **style)
+        bar = tqdm(total=self._total, initial=self._done, unit=self._unit, file=_Screen(), **style)
         if not bar.disable:  # by the environment variable TQDM_DISABLE
             bar.start_t -= elapsed
         return bar

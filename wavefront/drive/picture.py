@@ -303,6 +303,7 @@ class Picture:
             "aovs": list(plan.tracer.recorded_aovs),
             **codes,
             "camera": fingerprint("the camera", plan.scene.compiled.view(self.camera)),
+            **({} if plan.scene.scene.moment is None else {"time": plan.scene.scene.moment}),
             SCENE: scene,
         }
 

@@ -65,6 +65,7 @@ class PreparedScene:
 
     def __init__(self, scene: Scene, settings: Settings, camera: Camera, framed: Camera | None) -> None:
         self.scene, self._camera, self._geometries = scene, camera, list[Geometry]()
+        self._framed = framed is not None
         self._fingerprint: str | None = None
         self._light(settings, camera, framed)
         if settings.values["integrator"] == "naive":
@@ -88,6 +89,16 @@ class PreparedScene:
         above = is_above(scene, camera, framed is not None, up)
         self.ground = choose_ground(values["ground"], chosen, above, values["background"])
         self.lighted = lighted(scene, self.preset, ground=self.ground, up=up, camera=framed)
+
+    def suits(self, camera: Camera | None, settings: Settings) -> bool:
+        """Return whether light and ground are those for another camera; None is one that frames the scene."""
+        if (camera is None) != self._framed or self.scene.has_lights_of_file:
+            return False
+        above = camera is None or is_above(
+            self.scene, camera, False, self.scene.vertical(settings.values["up"])
+        )
+        given = settings.values["ground"], self.light_is_chosen, above, settings.values["background"]
+        return camera is None or choose_ground(*given) == self.ground
 
     def _compile(self, settings: Settings) -> CompiledScene:
         """Compile the scene, and note what its accelerators are built from."""

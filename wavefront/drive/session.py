@@ -338,6 +338,10 @@ class Session:
             self._plan = with_choice(self._plan, camera)
             self._begin_picture(camera, sums, begin)
 
+    def suits(self, camera: Camera | None) -> bool:
+        """Return whether light and ground are those for another camera; None is one that frames the scene."""
+        return self._scene.suits(camera, self._settings)
+
     def stop(self) -> None:
         """End the render: the loop over the session ends with the picture so far.
 

@@ -1,0 +1,88 @@
+"""The command `wavefront animate`: what moves in a file as an animation."""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Callable
+from copy import copy
+
+from ..animation import check_animation, save_animation
+from ..camera.moves import orbit
+from ..core.errors import SceneError, number
+from ..core.plural import plural
+from ..core.progress import Progress
+from ..drive.frames import frame_times, render_frames
+from ..io.to_scene import choose_camera
+from ..scene import Scene
+from .command import SCENE_FILE, add_command
+from .messages import print_done
+from .options import framing, read_scene, setting_values
+from .view_commands import add_settings_of_series, checked_display
+
+
+def add_animate_command(commands: object) -> None:
+    """Add the command and its options to a parser's commands."""
+    command = add_command(
+        commands,
+        "animate",
+        "render what moves in a file",
+        [
+            "wavefront animate fox.glb -o fox.mp4 --fps 24 --animation Run --turntable 90",
+            "wavefront animate fox.glb -o 'frame_{:03d}.png' --checkpoint 'fox_{:03d}.wfck'",
+        ],
+    )
+    command.add_argument("scene", help=SCENE_FILE)
+    command.add_argument(
+        "-o",
+        "--output",
+        default="animation.gif",
+        help="gif, png (animated) or mp4 file to write, or numbered files such as frame_{:03d}.png",
+    )
+    command.add_argument("--fps", type=float, default=24.0, help="pictures per second of the file")
+    command.add_argument("--start", type=float, help="seconds of the file (default: where it begins to move)")
+    command.add_argument("--end", type=float, help="seconds of the file (default: where all motion is over)")
+    command.add_argument(
+        "--turntable", type=float, default=0.0, help="degrees by which the view turns meanwhile"
+    )
+    add_settings_of_series(command)
+    command.set_defaults(run=_animate)
+
+
+def _animate(options: argparse.Namespace) -> int:
+    check_animation(options.output)
+    if options.time is not None:
+        raise SceneError("--time is one moment; give --start and --end")
+    display = checked_display(options)
+    progress: Progress = False if options.quiet else None
+    scene = read_scene(options.scene, options, progress)
+    start = scene.start if options.start is None else number("--start", options.start)
+    end = scene.end if options.end is None else number("--end", options.end)
+    if end < start:
+        raise SceneError(f"--end is {end:g}, before the start at {start:g} s")
+    times = frame_times(None, options.fps, (start, end))
+    if len(times) == 1 and not options.turntable:
+        raise SceneError(
+            f"{options.scene}: nothing moves for longer than a picture; give --turntable or --end"
+        )
+    settings = {"progress": progress, **setting_values(options)}
+    images = render_frames(_turning(scene, options, start, end), times, **settings)
+    written = save_animation(options.output, images, fps=options.fps, **display)
+    print_done(f"{options.output}: {plural(written, 'picture')}")
+    return 0
+
+
+def _turning(scene: Scene, options: argparse.Namespace, start: float, end: float) -> Callable[[float], Scene]:
+    """Return what gives the scene of a time, whose camera turns around the middle of all times."""
+    given, turn = framing(options), number("--turntable", options.turntable)
+    up, middle = scene.vertical(options.up), scene.reach.mean(0)
+    size, view, fov = given["size"], given["view"], given["fov"]
+    framed, _ = choose_camera(scene, None, size, up, view, fov, turning=bool(turn))
+
+    def scene_at(time: float) -> Scene:
+        moment = copy(scene.at(time))
+        camera, _ = choose_camera(moment, None, size, up, view, fov) if scene.camera else (framed, True)
+        angle = turn * (time - start) / (end - start) if end > start else 0.0
+        moment.camera = orbit(camera, middle, angle, up) if turn else camera
+        return moment
+
+    return scene_at
