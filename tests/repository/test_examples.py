@@ -19,6 +19,7 @@ SHAPES = {  # the picture of --size 24, (height, width)
     "caustics": (15, 24),
     "cloud": (18, 24),
     "cornell_box": (24, 24),
+    "cradle": (16, 16, 24),
     "course_spheres": (24, 24),
     "cuboids": (16, 24),
     "default_look": (20, 24),
