@@ -104,5 +104,5 @@ print(np.array_equal(steps[-1].light.T.reshape(48, 48, 3), image.rgb))
 # 1. Let the camera see a mirror in place of the matte ball. *Expect* that its columns come last after
 #    ``compact``, as materials with only delta lobes do, and that ``direct`` leaves the light there as it
 #    is.
-# 2. Print the steps for ``max_bounces=20``. *Expect* as many paths at ``intersect`` as at the ``bounce-
-#    sample`` before it at the first two surfaces, and fewer from the third on: Russian roulette ends them.
+# 2. Print the steps for ``max_bounces=20``. *Expect* as many paths at ``intersect`` as at the step before it
+#    at the first two surfaces, and fewer from the third on: Russian roulette ends them.
