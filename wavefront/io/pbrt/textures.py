@@ -18,6 +18,9 @@ from .entities import converts, placement, spectrum, unsupported
 from .mappings import Mapped, MappedTexture, Mapping, mapping_of
 from .noise import noise
 
+WRAPS: dict[str, Any] = {"repeat": "repeat", "clamp": "clamp", "black": "clamp"}
+FILTERS: dict[str, Any] = {"bilinear": "bilinear", "point": "nearest", "trilinear": "bilinear"}
+FILTERS |= {"ewa": "bilinear", "EWA": "bilinear"}
 DOT = 0.35  # radius of dots in cells of size 1
 
 
@@ -187,21 +190,16 @@ def image(entity: Entity, channel: str | None) -> Texture:
     file = entity.text("filename", "")
     codes, name = entity.job.picture(entity, file)
     encoding = entity.text("encoding", "sRGB" if file.lower().endswith(".png") else "linear")
-    if codes.dtype.kind == "u" and encoding.startswith("gamma"):
-        exponent = _exponent(encoding)
-        codes = (codes / np.float32(np.iinfo(codes.dtype).max)).astype(np.float32) ** np.float32(exponent)
-    elif encoding not in ("sRGB", "linear") and not encoding.startswith("gamma"):
-        raise SceneError(f"encoding is {encoding!r}; it must be sRGB, linear or gamma with a number")
-    wrap = entity.choice("wrap", "repeat", ("repeat", "clamp", "black"))
+    codes = _decoded(codes, encoding)
+    wrap = entity.choice("wrap", "repeat", tuple(WRAPS))
     if wrap == "black":
         entity.lose("wrap 'black'; 'clamp' in its place")
-    kind = entity.choice("filter", "bilinear", ("bilinear", "point", "trilinear", "ewa", "EWA"))
-    mapping = mapping_of(entity)
+    kind, mapping = entity.choice("filter", "bilinear", tuple(FILTERS)), mapping_of(entity)
     texture = MappedTexture(
         StoredImage(codes, name),
         srgb=encoding == "sRGB",
-        wrap="clamp" if wrap == "black" else wrap,  # type: ignore[arg-type]
-        filter="nearest" if kind == "point" else "bilinear",
+        wrap=WRAPS[wrap],
+        filter=FILTERS[kind],
         transform=mapping.transform,
         channel=channel,  # type: ignore[arg-type]
         uv_set=mapping.uv_set,
@@ -212,14 +210,21 @@ def image(entity: Entity, channel: str | None) -> Texture:
     return _scaled(scaled, -1.0, 1.0) if entity.flag("invert") else scaled
 
 
-def _exponent(encoding: str) -> float:
+def _decoded(codes: Any, encoding: str) -> Any:
+    """Return linear values where the encoding of 8 or 16 bits is a power; others are as they are."""
+    if not encoding.startswith("gamma"):
+        if encoding not in ("sRGB", "linear"):
+            raise SceneError(f"encoding is {encoding!r}; it must be sRGB, linear or gamma with a number")
+        return codes
+    if codes.dtype.kind != "u":
+        return codes
     try:
-        value = float(encoding.split()[1])
+        exponent = float(encoding.split()[1])
     except (IndexError, ValueError):
-        value = 0.0
-    if not 0 < value < 100:
+        exponent = 0.0
+    if not 0 < exponent < 100:
         raise SceneError(f"encoding is {encoding!r}; gamma needs a number above 0")
-    return value
+    return (codes / np.float32(np.iinfo(codes.dtype).max)).astype(np.float32) ** np.float32(exponent)
 
 
 def _scaled(texture: Texture, factor: float, offset: float = 0.0) -> Texture:
