@@ -142,31 +142,46 @@ def test_subsets_have_materials_of_their_own(tmp_path: Path) -> None:
     assert first.material.name is None
 
 
-def test_preview_surfaces(tmp_path: Path) -> None:
-    text = """color3f inputs:emissiveColor = (1, 2, 3)
-        float inputs:metallic = 0.25
-        float inputs:roughness = 0.75
-        float inputs:ior = 1.4
-        float inputs:clearcoat = 0.5
-        float inputs:clearcoatRoughness = 0.125
-        float inputs:opacity = 0.5"""
-    (mesh,) = load(tmp_path, PAINT % (text, "") + BOUND).shapes
-    bsdf = mesh.material.bsdf
-    for name, value in (
-        ("base_color", 0.18),
-        ("metallic", 0.25),
-        ("roughness", 0.75),
-        ("ior", 1.4),
-        ("clearcoat", 0.5),
-        ("clearcoat_roughness", 0.125),
-    ):
-        np.testing.assert_allclose(getattr(bsdf, name), value, rtol=1e-6)
-    assert rows(mesh.emission) == [1, 2, 3]
-    (plain,) = load(tmp_path, PAINT % ("", "") + BOUND).shapes
-    for name, value in (("roughness", 0.5), ("metallic", 0), ("ior", 1.5), ("clearcoat_roughness", 0.01)):
-        np.testing.assert_allclose(getattr(plain.material.bsdf, name), value, rtol=1e-6)
-    assert float(np.ravel(mesh.material.alpha)[0]) == 0.5
-    assert rows(mesh.uvs[mesh.faces[0]]) == [0, 0, 1, 0, 1, 1]
+def surface(folder: Path, inputs: str) -> Any:
+    """Return the mesh of a UsdPreviewSurface with inputs, which semicolons divide."""
+    write_image(folder / "a.png", np.full((4, 4, 3), 0.5, np.float32))
+    lines = "\n".join(f"        {each}" for each in inputs.split("; "))
+    (mesh,) = load(folder, PAINT % (lines, IMAGE) + BOUND).shapes
+    return mesh
+
+
+SHINY = "float inputs:clearcoat = 0.5; float inputs:clearcoatRoughness = 0.125"
+SPECULAR = "int inputs:useSpecularWorkflow = 1; float inputs:metallic = 1; float inputs:ior = 1.2"
+TINT = "color3f inputs:specularColor"
+
+
+@pytest.mark.parametrize(
+    ("inputs", "due"),
+    [
+        ("", {"material.bsdf.base_color": Near(0.18), "material.bsdf.metallic": 0, "emission": None}),
+        ("", {"material.bsdf.roughness": 0.5, "material.bsdf.ior": 1.5, "material.alpha": None}),
+        ("", {"material.bsdf.clearcoat": 0, "material.bsdf.clearcoat_roughness": Near(0.01)}),
+        ("", {"uvs": [[0, 0], [1, 0], [1, 1], [0, 1]]}),
+        ("color3f inputs:emissiveColor = (1, 2, 3)", {"emission": [1, 2, 3]}),
+        ("float inputs:metallic = 0.25", {"material.bsdf.metallic": 0.25}),
+        ("float inputs:roughness = 0.75", {"material.bsdf.roughness": 0.75}),
+        ("float inputs:ior = 1.4", {"material.bsdf.ior": Near(1.4)}),
+        (SHINY, {"material.bsdf.clearcoat": 0.5, "material.bsdf.clearcoat_roughness": 0.125}),
+        ("float inputs:opacity = 0.5", {"material.alpha": 0.5}),
+        (
+            SPECULAR,
+            {"material.bsdf.metallic": 0, "material.bsdf.ior": 1.5, "material.bsdf.specular_color": 0},
+        ),
+        (f"{SPECULAR}; {TINT} = (0.1, 0.2, 0.4)", {"material.bsdf.specular_color": Near([2.5, 5, 10])}),
+        (
+            f"{SPECULAR}; {TINT}.connect = </paint/image.outputs:rgb>",
+            {"material.bsdf.specular_color.scale": Near(12.5)},
+        ),
+        (f"float inputs:metallic = 1; {TINT} = (0.1, 0.2, 0.4)", {"material.bsdf.specular_color": 1}),
+    ],
+)
+def test_preview_surfaces(tmp_path: Path, inputs: str, due: Any) -> None:
+    check(surface(tmp_path, inputs), due)
 
 
 def test_textures(tmp_path: Path) -> None:
@@ -387,45 +402,56 @@ def test_panels_may_be_stretched_and_balls_not(tmp_path: Path) -> None:
         load(tmp_path, MESH + body.replace("Rect", "Sphere"))
 
 
-def test_lights_at_infinity(tmp_path: Path) -> None:
-    write_image(tmp_path / "sky.exr", np.linspace(0, 1, 96, dtype=np.float32).reshape(4, 8, 3))
-    body = (
-        MESH
-        + """def DistantLight "sun"
-{
-    float inputs:intensity = 5
-    float inputs:angle = 1
-    bool inputs:normalize = 1
-}
-def DomeLight "sky"
-{
-    color3f inputs:color = (1, 0.5, 0.25)
-    asset inputs:texture:file = @sky.exr@
-}
-"""
-    )
-    sun, sky = load(tmp_path, body).lights
-    np.testing.assert_allclose(sun.direction, [0, 0, -1], atol=1e-6)
-    np.testing.assert_allclose(np.ravel(sun.irradiance), 5)
-    assert sun.angle == 1
-    assert isinstance(sky, wf.Environment)
-    (plain,) = load(tmp_path, body.replace("bool inputs:normalize = 1", "")).lights[:1]
-    np.testing.assert_allclose(np.ravel(plain.irradiance), 5 * np.pi * np.sin(np.radians(0.5)) ** 2)
+PLACED = "double3 xformOp:translate = (0, 4, 0); float xformOp:rotateX = -90; "
+PLACED += 'uniform token[] xformOpOrder = ["xformOp:translate", "xformOp:rotateX"]'
+POINT = f"float inputs:radius = 0.5; float inputs:intensity = 3; bool treatAsPoint = 1; {PLACED}"
+CONE = "float inputs:shaping:cone:angle = 30; float inputs:shaping:cone:softness = 0.25"
+SUN = "float inputs:intensity = 5; float inputs:angle = 1"
+EVEN = "bool inputs:normalize = 1"
+SEEN = "float horizontalAperture = 36; float verticalAperture = 24; float focalLength = 50"
 
 
 @pytest.mark.parametrize(
-    ("kind", "due"),
+    ("kind", "lines", "due"),
     [
-        ("SphereLight", {"shapes[1].radius": 0.5, "shapes[1].emission": 1}),
-        ("DiskLight", {"shapes[1].bounds": Near([[-0.5, -0.5, 0], [0.5, 0.5, 0]], 1e-3)}),
-        ("RectLight", {"shapes[1].bounds": [[-0.5, -0.5, 0], [0.5, 0.5, 0]]}),
-        ("CylinderLight", {"shapes[1].bounds": Near([[-0.5, -0.5, -0.5], [0.5, 0.5, 0.5]], 1e-3)}),
-        ("DistantLight", {"lights[0].angle": Near(0.53)}),
-        ("DomeLight", {"lights[0].radiance": 1}),
+        # what is not written is as the schema says
+        ("SphereLight", "", {"shapes[1].radius": 0.5, "shapes[1].emission": 1}),
+        ("DiskLight", "", {"shapes[1].bounds": Near([[-0.5, -0.5, 0], [0.5, 0.5, 0]], 1e-3)}),
+        ("RectLight", "", {"shapes[1].bounds": [[-0.5, -0.5, 0], [0.5, 0.5, 0]]}),
+        ("CylinderLight", "", {"shapes[1].bounds": Near([[-0.5, -0.5, -0.5], [0.5, 0.5, 0.5]], 1e-3)}),
+        ("DistantLight", "", {"lights[0].angle": Near(0.53)}),
+        ("DomeLight", "", {"lights[0]": wf.Environment, "lights[0].radiance": 1}),
+        ("DomeLight", "color3f inputs:color = (1, 0.5, 0.25)", {"lights[0].radiance": [1, 0.5, 0.25]}),
+        # at points
+        ("SphereLight", POINT, {"lights[0]": wf.PointLight, "lights[0].position": Near([0, 4, 0])}),
+        ("SphereLight", POINT, {"lights[0].intensity": Near(3 * np.pi / 4)}),
+        (
+            "SphereLight",
+            f"{POINT}; {CONE}",
+            {"lights[0]": wf.SpotLight, "lights[0].position": Near([0, 4, 0])},
+        ),
+        ("SphereLight", f"{POINT}; {CONE}", {"lights[0].angle": 60, "lights[0].blend": 0.25}),
+        ("SphereLight", f"{POINT}; {CONE}", {"lights[0].direction": Near([0, -1, 0])}),
+        ("SphereLight", f"{POINT}; {CONE}", {"lights[0].intensity": Near(3 * np.pi / 4)}),
+        # at infinity
+        ("DistantLight", f"{SUN}; {EVEN}", {"lights[0].direction": Near([0, 0, -1]), "lights[0].angle": 1}),
+        ("DistantLight", f"{SUN}; {EVEN}", {"lights[0].irradiance": Near(5)}),
+        ("DistantLight", SUN, {"lights[0].irradiance": Near(5 * np.pi * np.sin(np.radians(0.5)) ** 2)}),
+        ("DomeLight", "asset inputs:texture:file = @sky.exr@", {"lights[0]": wf.Environment}),
+        # cameras
+        ("Camera", SEEN, {"camera.size": (768, 512), "camera.fov": Near(np.degrees(2 * np.arctan(12 / 50)))}),
+        (
+            "Camera",
+            f"{SEEN}; float fStop = 2; float focusDistance = 8",
+            {"camera.projection.aperture": Near(2.5), "camera.projection.focus": 8},
+        ),
+        ("Camera", PLACED, {"camera.origin": Near([0, 4, 0])}),
     ],
 )
-def test_inputs_that_are_not_written_are_those_of_the_schema(tmp_path: Path, kind: str, due: Any) -> None:
-    check(load(tmp_path, f'{MESH}def {kind} "lamp"\n{{\n}}\n'), due)
+def test_lights_and_cameras(tmp_path: Path, kind: str, lines: str, due: Any) -> None:
+    write_image(tmp_path / "sky.exr", np.linspace(0, 1, 96, dtype=np.float32).reshape(4, 8, 3))
+    body = "\n".join(f"    {each}" for each in lines.split("; "))
+    check(load(tmp_path, f'{MESH}def {kind} "it"\n{{\n{body}\n}}\n'), due)
 
 
 PARTS = """    double radius = 2
@@ -512,27 +538,6 @@ def test_cylinder_lights_shine_from_their_sides(tmp_path: Path) -> None:
         assert ((a + b + c) * normal).sum(1).min() > 0
 
 
-def test_the_specular_workflow(tmp_path: Path) -> None:
-    write_image(tmp_path / "a.png", np.full((4, 4, 3), 0.5, np.float32))
-    text = """int inputs:useSpecularWorkflow = 1
-        float inputs:metallic = 1
-        float inputs:ior = 1.2
-        color3f inputs:specularColor = (0.1, 0.2, 0.4)"""
-    (mesh,) = load(tmp_path, PAINT % (text, "") + BOUND).shapes
-    bsdf = mesh.material.bsdf
-    np.testing.assert_allclose(np.ravel(bsdf.specular_color) * 0.04, [0.1, 0.2, 0.4], rtol=1e-6)
-    np.testing.assert_allclose(np.ravel(bsdf.metallic), 0)
-    np.testing.assert_allclose(np.ravel(bsdf.ior), 1.5)
-    linked = text.replace(
-        "specularColor = (0.1, 0.2, 0.4)", "specularColor.connect = </paint/image.outputs:rgb>"
-    )
-    (mesh,) = load(tmp_path, PAINT % (linked, IMAGE) + BOUND).shapes
-    np.testing.assert_allclose(np.ravel(mesh.material.bsdf.specular_color.scale), 12.5, rtol=1e-6)
-    (mesh,) = load(tmp_path, PAINT % (text.replace("= 1\n", "= 0\n", 1), "") + BOUND).shapes
-    np.testing.assert_allclose(np.ravel(mesh.material.bsdf.specular_color), 1)
-    np.testing.assert_allclose(np.ravel(mesh.material.bsdf.metallic), 1)
-
-
 def test_orthographic_cameras(tmp_path: Path) -> None:
     body = """def Camera "view"
 {
@@ -566,29 +571,6 @@ def test_instances_have_the_materials_that_are_bound_to_them(tmp_path: Path) -> 
     assert shapes[0].mesh is shapes[2].mesh
 
 
-def test_cameras(tmp_path: Path) -> None:
-    body = (
-        MESH
-        + """def Camera "view"
-{
-    float horizontalAperture = 36
-    float verticalAperture = 24
-    float focalLength = 50
-    float fStop = 2
-    float focusDistance = 8
-    double3 xformOp:translate = (0, 0, 9)
-    uniform token[] xformOpOrder = ["xformOp:translate"]
-}
-"""
-    )
-    camera = load(tmp_path, body).camera
-    assert camera.size == (768, 512)
-    assert camera.fov == pytest.approx(np.degrees(2 * np.arctan(12 / 50)))
-    lens = camera.projection
-    assert (lens.aperture, lens.focus) == pytest.approx((2.5, 8))
-    np.testing.assert_allclose(camera.to_matrix()[:3, 3], [0, 0, 9])
-
-
 def test_the_first_time_counts(tmp_path: Path) -> None:
     body = MESH.replace(
         "{\n",
@@ -604,25 +586,6 @@ def test_the_first_time_counts(tmp_path: Path) -> None:
     assert mesh.vertices[:, 0].min() == 1.5
     with pytest.raises(wf.SceneError, match="time is nan; it must be finite"):
         load(tmp_path, body, time=np.nan)
-
-
-def test_lights_at_points(tmp_path: Path) -> None:
-    common = """    float inputs:radius = 0.5
-    float inputs:intensity = 3
-    bool treatAsPoint = 1
-    double3 xformOp:translate = (0, 4, 0)
-    float xformOp:rotateX = -90
-    uniform token[] xformOpOrder = ["xformOp:translate", "xformOp:rotateX"]
-"""
-    cone = "    float inputs:shaping:cone:angle = 30\n    float inputs:shaping:cone:softness = 0.25\n"
-    body = f'def SphereLight "a"\n{{\n{common}}}\ndef SphereLight "b"\n{{\n{common}{cone}}}\n'
-    point, spot = load(tmp_path, MESH + body).lights
-    assert (type(point), type(spot)) == (wf.PointLight, wf.SpotLight)
-    for light in (point, spot):
-        np.testing.assert_allclose(light.position, [0, 4, 0], atol=1e-6)
-        np.testing.assert_allclose(np.ravel(light.intensity), 3 * np.pi / 4, rtol=1e-6)
-    np.testing.assert_allclose(spot.direction, [0, -1, 0], atol=1e-6)
-    assert (spot.angle, spot.blend) == (60, 0.25)
 
 
 def test_errors_name_file_and_prim(tmp_path: Path) -> None:
