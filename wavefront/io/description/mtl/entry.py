@@ -146,19 +146,20 @@ class Entry:
             self.note(key, self.lines[key][2], f"clamped, as it must be {limit}")
         return limited
 
-    def texture(self, key: str, scale: Any = 1.0, kind: str = "color") -> Texture | None:
-        """Return the texture of an image of the kind "color", "scalar" or "data", None if there is none."""
+    def texture(self, key: str, scale: Any = 1.0, kind: Kind | None = None) -> Texture | None:
+        """Return the texture of an image, by default of the kind of its keyword; None if there is none."""
         if key not in self.lines:
             return None
+        kind = kind or keyword_of(key).kind
         options = self.image(key).options
         self.read.add(key)
         base, gain = self._option(key, options, "-mm", [0.0, 1.0])
         transform = self._placing(key, options)
-        channel = self._channel(key, options) if kind == "scalar" else None
+        channel = self._channel(key, options) if kind is Kind.CHANNEL else None
         try:
             return Texture(
                 self.images[key],
-                srgb=kind == "color",
+                srgb=kind is Kind.PICTURE,
                 wrap="clamp" if options.get("-clamp") == ["on"] else "repeat",
                 transform=transform,
                 channel=channel,

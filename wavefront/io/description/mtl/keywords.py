@@ -20,8 +20,9 @@ class Kind(Enum):
 
     NUMBER = "a number"
     COLOR = "a color"
-    IMAGE = "an image"
-    CHANNEL = "an image of which one channel counts"
+    PICTURE = "an image of colors"
+    CHANNEL = "an image of numbers, of which one channel counts"
+    DATA = "an image of other data"
     UNREAD = "what is not read"
 
 
@@ -57,11 +58,11 @@ KEYWORDS = {
     "ni": Keyword(Kind.NUMBER, high=MAX_INDEX, idle=True),  # without glass
     "illum": Keyword(Kind.NUMBER, high=LARGEST_ILLUM),
     "sharpness": Keyword(Kind.UNREAD, neutral=60.0),
-    "map_kd": Keyword(Kind.IMAGE),
-    "map_ks": Keyword(Kind.IMAGE),
-    "map_ke": Keyword(Kind.IMAGE),
+    "map_kd": Keyword(Kind.PICTURE),
+    "map_ks": Keyword(Kind.PICTURE),
+    "map_ke": Keyword(Kind.PICTURE),
     "map_d": Keyword(Kind.CHANNEL),
-    "norm": Keyword(Kind.IMAGE, multiplied=True),
+    "norm": Keyword(Kind.DATA, multiplied=True),
     "map_bump": Keyword(Kind.CHANNEL, multiplied=True),
     "bump": Keyword(Kind.CHANNEL, multiplied=True),
     **{row.theirs: Keyword(Kind.NUMBER, row.high) for row in PBR},
@@ -83,13 +84,13 @@ def keyword_of(key: str) -> Keyword:
 
 def is_image(key: str) -> bool:
     """Return whether an image stands after a keyword."""
-    return keyword_of(key).kind in (Kind.IMAGE, Kind.CHANNEL)
+    return keyword_of(key).kind in (Kind.PICTURE, Kind.CHANNEL, Kind.DATA)
 
 
 def options_read(key: str) -> frozenset[str]:
     """Return the options that count of the image of a keyword."""
     keyword = keyword_of(key)
-    channel = () if keyword.kind is Kind.IMAGE else ("-imfchan",)
+    channel = ("-imfchan",) if keyword.kind is Kind.CHANNEL else ()
     return READ.union(channel, ("-bm",) if keyword.multiplied else ())
 
 

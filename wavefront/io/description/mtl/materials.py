@@ -15,7 +15,7 @@ from ....textures.normal_map import BaseNormalMap, BumpMap, NormalMap
 from ..appearance import MaterialSpec, build_material
 from ..parameters import fill
 from .entry import Entry
-from .keywords import BUMPS, LARGEST_ILLUM, LARGEST_NS, PBR
+from .keywords import BUMPS, LARGEST_ILLUM, LARGEST_NS, PBR, Kind
 
 # values of `illum`
 GLASS = (4, 6, 7, 9)
@@ -115,7 +115,7 @@ def _wanted(entry: Entry) -> dict[str, Any]:
         wanted,
         PBR,
         lambda row: entry.part(row.theirs, row.default) if entry.has(row.theirs) else None,
-        lambda row, factor: entry.texture(row.image, factor, "scalar"),
+        lambda row, factor: entry.texture(row.image, factor),
     )
     return wanted | {"alpha": _alpha(entry)}
 
@@ -137,7 +137,7 @@ def _alpha(entry: Entry) -> Any:
     """Return the opacity: a number or a texture."""
     factor = _opacity(entry)
     entry.read.update(("d", "tr"))
-    texture = entry.texture("map_d", factor, "scalar")
+    texture = entry.texture("map_d", factor)
     return factor if texture is None else texture
 
 
@@ -176,12 +176,12 @@ def _made(entry: Entry, key: str, make: Callable[[Entry, str], BaseNormalMap | N
 
 
 def _normal_map(entry: Entry, key: str) -> NormalMap | None:
-    texture = entry.texture(key, kind="data")
+    texture = entry.texture(key, kind=Kind.DATA)
     return None if texture is None else NormalMap(texture, entry.multiplier(key))
 
 
 def _bump_map(entry: Entry, key: str) -> BumpMap | None:
-    texture = entry.texture(key, kind="scalar")
+    texture = entry.texture(key)
     return None if texture is None else BumpMap(texture, entry.multiplier(key))
 
 
@@ -189,7 +189,7 @@ def _looks_like_normals(entry: Entry, key: str) -> bool:
     """Return whether the mean of an image is about (0.5, 0.5, 1), as in normal maps."""
     if "-imfchan" in entry.image(key).options:
         return False
-    texture = entry.texture(key, kind="data")
+    texture = entry.texture(key, kind=Kind.DATA)
     if texture is None or texture.channels < 3:
         return False
     red, green, blue = texture.mean()
