@@ -8,6 +8,7 @@ import re
 import tracemalloc
 import warnings
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -198,13 +199,72 @@ def test_transforms(tmp_path: Path, steps: str, expected: tuple[float, ...]) -> 
     np.testing.assert_allclose(mesh.vertices[0], expected, atol=1e-12)
 
 
-def test_what_moves_stands_where_it_begins(tmp_path: Path) -> None:
-    body = f"Translate 1 0 0 ActiveTransform EndTime Translate 5 0 0 {POINT}"
-    with pytest.warns(
-        UserWarning, match="line 3: shape 'trianglemesh': its motion; it stands where it begins"
-    ):
-        (mesh,) = load(tmp_path, body, strict=False).shapes
-    assert mesh.vertices[0].tolist() == [2, 2, 3]
+MOVES = "Translate 1 0 0 ActiveTransform EndTime Translate 4 0 0 Rotate 90 0 0 1"
+
+
+def at(shape: Any) -> Any:
+    """Return where the first vertex of a mesh stands."""
+    mesh = shape.to_mesh() if isinstance(shape, wf.Instance) else shape
+    return mesh.vertices[0]
+
+
+def test_what_moves_goes_from_its_first_transform_to_its_second(tmp_path: Path) -> None:
+    scene = load(tmp_path, f"{MOVES} {POINT}")
+    assert (scene.start, scene.end) == (0, 1)
+    np.testing.assert_allclose(at(scene.shapes[0]), [2, 2, 3], atol=1e-12)
+    np.testing.assert_allclose(at(scene.at(1).shapes[0]), [3, 1, 3], atol=1e-12)
+    half = np.sqrt(0.5)  # turned by 45 degrees about (3, 0, 0)
+    np.testing.assert_allclose(at(scene.at(0.5).shapes[0]), [3 + half - 2 * half, 3 * half, 3], atol=1e-12)
+
+
+def test_transforms_have_times_and_the_shutter_is_that_of_the_camera(tmp_path: Path) -> None:
+    camera = 'TransformTimes 2 4 Camera "perspective" "float shutteropen" 2.5 "float shutterclose" 3'
+    scene = load(tmp_path, f"{MOVES} {POINT}", header=camera)
+    assert (scene.start, scene.end) == (2, 4)
+    assert scene.settings["shutter"] == (2.5, 3)
+    assert "shutter" not in load(tmp_path, POINT, header=camera).settings
+
+
+def test_cameras_lights_and_instances_move(tmp_path: Path) -> None:
+    camera = 'ActiveTransform EndTime Translate 0 0 -4 ActiveTransform All Camera "perspective"'
+    body = f"""AttributeBegin ActiveTransform EndTime Translate 0 6 0 LightSource "point" AttributeEnd
+    ObjectBegin "thing" {POINT} ObjectEnd ObjectInstance "thing" {MOVES} ObjectInstance "thing"
+    """
+    scene = load(tmp_path, body, header=camera)
+    assert scene.camera is not None
+    assert scene.camera.moves
+    still = scene.at(0.5)
+    assert still.camera is not None
+    np.testing.assert_allclose(still.camera.origin, np.add(scene.camera.origin, (0, 0, 2)), atol=1e-12)
+    np.testing.assert_allclose(still.camera.rotation, scene.camera.rotation, atol=1e-12)
+    np.testing.assert_allclose(still.lights[0].position, [0, 3, 0], atol=1e-12)  # type: ignore[attr-defined]
+    assert [shape.moves for shape in scene.shapes] == [False, True]
+    np.testing.assert_allclose(at(scene.at(1).shapes[1]), [-3, 1, 3], atol=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("body", "message"),
+    [
+        (f"ActiveTransform EndTime Scale 1 0 1 {POINT}", "singular.*its motion left out; it stands"),
+        (f"ActiveTransform EndTime Scale -1 1 1 {POINT}", "one mirrors and the other does not"),
+        (
+            f'ObjectBegin "a" {MOVES} {POINT} ObjectEnd ObjectInstance "a"',
+            "its motion in an object; it stands where it begins",
+        ),
+        (f'ActiveTransform EndTime Rotate 9 0 1 0 LightSource "infinite" Identity {POINT}',
+         "cannot be moved.*its motion left out"),
+    ],
+)  # fmt: skip
+def test_motion_that_cannot_be_is_left_out(tmp_path: Path, body: str, message: str) -> None:
+    with pytest.warns(UserWarning, match=f"(?s){message}"):
+        scene = load(tmp_path, body, strict=False)
+    assert not scene.moves
+    assert "shutter" not in scene.settings
+
+
+def test_times_that_do_not_rise_are_noted(tmp_path: Path) -> None:
+    with pytest.warns(UserWarning, match="TransformTimes is 4 4; the end must be after the start"):
+        load(tmp_path, f"TransformTimes 4 4 {POINT}", strict=False)
 
 
 def test_included_files_take_part_as_if_they_stood_there(tmp_path: Path) -> None:

@@ -582,7 +582,9 @@ def test_the_first_time_counts(tmp_path: Path) -> None:
     )
     (mesh,) = load(tmp_path, body, "metersPerUnit = 1\nstartTimeCode = 5\nendTimeCode = 9").shapes
     assert mesh.vertices[:, 0].min() == 1
-    (mesh,) = load(tmp_path, body, "metersPerUnit = 1\nstartTimeCode = 5\nendTimeCode = 9", time=7).shapes
+    (mesh,) = load(
+        tmp_path, body, "metersPerUnit = 1\nstartTimeCode = 5\nendTimeCode = 9", time=7 / 24
+    ).shapes
     assert mesh.vertices[:, 0].min() == 1.5
     with pytest.raises(wf.SceneError, match="time is nan; it must be finite"):
         load(tmp_path, body, time=np.nan)

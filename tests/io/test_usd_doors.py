@@ -203,7 +203,7 @@ def test_layers_in_allowed_folders_are_read(tmp_path: Path) -> None:
     path = home / "a.usda"
     head = '(expressionVariables = { string NAME = "beside" }\nmetersPerUnit = 1)\n'
     path.write_text(H + head + body)
-    scene = load(path, strict=True, search_paths=shared, time=1)
+    scene = load(path, strict=True, search_paths=shared, time=1 / 24)
     assert [shape.radius for shape in scene.shapes] == [1] * 6 + [3]
 
 

@@ -65,7 +65,7 @@ SHAPES = """uniform token[] skel:blendShapes = ["wide"]
 def corners(folder: Path, body: str, time: float | None = None) -> list[list[float]]:
     path = folder / "a.usda"
     path.write_text(f"#usda 1.0\n(metersPerUnit = 1)\n{body}")
-    (shape,) = wf.load(path, strict=True, time=time, progress=False).shapes
+    (shape,) = wf.load(path, strict=True, time=None if time is None else time / 24, progress=False).shapes
     matrix = shape.transform if isinstance(shape, wf.Instance) else np.eye(4)
     points = (shape.mesh if isinstance(shape, wf.Instance) else shape).vertices
     return np.round(points @ matrix[:3, :3].T + matrix[:3, 3], 5).tolist()

@@ -5,18 +5,21 @@ from __future__ import annotations
 import os
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
+from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from typing import Any
 
 from numpy.typing import ArrayLike
 
 from ..codecs.budget import in_memory
-from ..core.errors import SceneError, number
+from ..core.errors import SceneError, collect_warnings, number
 from ..core.files import path_name
 from ..core.progress import Progress, phase
 from ..core.suggestions import suggests_keywords
 from ..materials import MaterialLike
 from ..scene import Scene
+from ..scene.file_moments import FileMoments
 from ..shapes import Instance, Mesh, Shape
 from ..shapes.smoothing import AUTO, check_smooth
 from .description.placing import place_meshes
@@ -98,11 +101,22 @@ def load(
             time=None if time is None else number("time", time),
             animation=animation,
         )
-        scene = read(path, options).scene(path_name(path), losses)
-        scene = scene if time is None else scene.at(options.time or 0.0)
+        contents = read(path, options)
+        scene = contents.scene(path_name(path), losses)
+        scene = scene if options.time is None else scene.at(options.time)
+        if contents.span is not None and options.time is None:
+            at = partial(_read_at, path, options)
+            scene.file_moments = FileMoments(at, contents.span, scene)
         if not os.fspath(path).lower().endswith(ALL_OF_THE_LIGHT):
             scene.lights_of_file = [id(each) for each in scene.lights]
         return scene
+
+
+def _read_at(path: PathLike, options: LoadOptions, time: float) -> Scene:
+    """Read a file again, at another time; what is lost of it has been said."""
+    name = path_name(path)
+    with collect_warnings(), Losses(name) as losses:
+        return read(path, replace(options, losses=losses, time=time)).scene(name, losses)
 
 
 @suggests_keywords

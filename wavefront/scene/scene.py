@@ -24,6 +24,7 @@ from ..media import BaseMedium
 from ..motion import Moving
 from ..shapes import Group, Instance, Mesh, PrimitiveArray, Shape
 from ..shapes.instance import instance_bounds, instance_hulls
+from .file_moments import FileMoments
 from .html import scene_html
 from .loss import Loss
 from .moments import MOMENTS, Moments
@@ -128,6 +129,7 @@ class Scene(Answers):
         self.lights_of_file: list[int] | None = None  # their ids, where it was read from a file
         self.animations: tuple[str, ...] = ()
         self.moment: float | None = None
+        self.file_moments: FileMoments | None = None  # where its file is read anew for each time
         self._whole: Scene | None = None  # of which this is a moment
         self._moments: Moments | None = None  # what moves, and how far it reaches, once it was asked for
         self._reach: Doubles | None = None
@@ -257,7 +259,7 @@ class Scene(Answers):
     @property
     def moves(self) -> bool:
         """Whether a shape, a light or the camera moves or deforms."""
-        return any(each.moves for each in self._seen) or self._moving.any
+        return self.file_moments is not None or any(each.moves for each in self._seen) or self._moving.any
 
     @property
     def _seen(self) -> list[Moving]:
@@ -266,6 +268,7 @@ class Scene(Answers):
 
     def _span(self) -> tuple[float, float]:
         spans = [*self._moving.spans, *(each.time_span for each in self._seen if each.moves)]
+        spans += [] if self.file_moments is None else [self.file_moments.span]
         return min(span[0] for span in spans or [(0.0, 0.0)]), max(span[1] for span in spans or [(0.0, 0.0)])
 
     def at(self, time: float) -> Scene:
@@ -294,18 +297,21 @@ class Scene(Answers):
         [0.0, 1.0, 0.0]
         """
         time, moving = number("time", time), self._moving
-        if not moving.any and not any(each.moves for each in self._seen):
+        if not (moving.any or self.file_moments is not None or any(each.moves for each in self._seen)):
             return self
-        shapes = moving.at(time)
+        if self.file_moments is not None:
+            shapes, lights, camera = self.file_moments.at(self, time)
+        else:
+            shapes, lights = moving.at(time), [light.at(time) for light in self.lights]
+            camera = None if self.camera is None else self.camera.at(time)
         if not shapes:
             raise SceneError(f"at {time:g} s the scene has no shapes: all of them have no size")
         moment = copy(self)
-        moment._shapes = _checked(Shapes, shapes)
-        moment._lights = _checked(Lights, (light.at(time) for light in self.lights))
-        moment._camera = None if self.camera is None else self.camera.at(time)
+        moment._shapes, moment._lights = _checked(Shapes, shapes), _checked(Lights, lights)
+        moment._camera = camera
         if self.has_lights_of_file:
             moment.lights_of_file = [id(each) for each in moment._lights]
-        moment.moment, moment._whole, moment._moments = time, self, None
+        moment.moment, moment._whole, moment._moments, moment.file_moments = time, self, None, None
         return moment
 
     @property
@@ -317,6 +323,8 @@ class Scene(Answers):
     def _samples(self) -> list[Scene]:
         """Scenes of some times, which together reach as far as the shapes ever do."""
         source = self._source
+        if source.file_moments is not None:
+            return source.file_moments.samples(source)
         if not source._moving.any:
             return [self]
         return [source.at(time) for time in np.linspace(*source._span(), MOMENTS)]

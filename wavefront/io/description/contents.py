@@ -29,6 +29,7 @@ class Contents:
     up: str | None = None  # the axis that is up by the format or the file; None where neither says
     settings: Mapping[str, Any] = field(default_factory=dict)  # as of `Scene`
     medium: BaseMedium | None = None  # around the shapes
+    span: tuple[float, float] | None = None  # seconds, where the file is to be read anew for each time
     animations: tuple[str, ...] = ()  # names of those of the file, of which one is read
     flat: bool = False  # whether meshes without normals have flat facets by the format
 

@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from ...camera import Camera, Sensors, SurfaceSensors
+from ...core.errors import number
 from ...lights import Environment, Light, Sky
 from ...scene import Scene
 from ..description.contents import Contents
@@ -17,6 +18,7 @@ from ..sources import SceneFiles
 from . import bsdfs, emitters, shapes, textures  # noqa: F401  they fill the table
 from .media import medium_around
 from .nodes import Graph, Job, plugin
+from .transforms import moved
 from .views import DEFAULT_FILM, check_clipping, meter_on, sees_media
 
 
@@ -67,7 +69,7 @@ def _scene(entity: Entity) -> Contents:
     camera, settings = seen[0][2] if seen else (None, {})
     measures = bool(seen) and (camera is None or isinstance(camera, Sensors))
     followed = _followed(entity, camera, measures)
-    found = [shape for part in parts for shape in job.convert(part)]
+    found = [shape for part in parts for shape in moved(part, job.convert(part))]
     lights = only_one(_lights(entity), job.files.losses)
     found = shown(found, lights, job.files.losses)
     settings = settings | followed
@@ -80,8 +82,20 @@ def _scene(entity: Entity) -> Contents:
         check_clipping(seen[0][0], camera, found)
     if isinstance(camera, Sensors):
         camera = camera.above(Scene(found).bounds)
+    if seen and camera is not None and not measures:
+        (camera,) = moved(seen[0][0], [camera])
+        settings = settings | _shutter(seen[0][0], [*found, *lights, camera])
     medium = medium_around(entity, seen[0][0] if seen else None)
     return Contents(lights=lights, camera=camera, shapes=found, settings=settings, medium=medium)
+
+
+def _shutter(sensor: Entity, parts: list[Any]) -> dict[str, Any]:
+    """Return the setting of the shutter where something moves while it is open."""
+    if not any(each.moves for each in parts):
+        return {}
+    names = "shutter_open", "shutter_close"
+    open_, close = (number(name, sensor.values.get(name, 0.0)) for name in names)
+    return {"shutter": (open_, close)} if open_ < close else {}
 
 
 def _sensors(entity: Entity, parts: list[Entity]) -> list[tuple[Entity, Entity, Any]]:
@@ -111,8 +125,9 @@ def _followed(entity: Entity, camera: Camera | None, measures: bool) -> dict[str
 
 def _lights(entity: Entity) -> list[Light]:
     lamps = [part for part in entity.held("emitter") if part.type != "area"]
-    made = [light for part in lamps if (light := entity.job.convert(part)) is not None]
-    return [light for each in made for light in (each if isinstance(each, list) else [each])]
+    made = [(part, light) for part in lamps if (light := entity.job.convert(part)) is not None]
+    lists = [(part, each if isinstance(each, list) else [each]) for part, each in made]
+    return [light for part, each in lists for light in moved(part, each)]
 
 
 def _meter(sensor: Entity, place: Entity) -> SurfaceSensors | None:

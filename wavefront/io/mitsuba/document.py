@@ -18,6 +18,7 @@ import numpy as np
 from ...codecs.budget import PER_BYTE
 from ...core.errors import LimitError, SceneError, one_of
 from ...core.suggestions import did_you_mean
+from ...motion import Keyframes
 from ...shapes.transform import Matrix
 from ..description.conversion import check_included, placed
 from ..losses import Losses
@@ -170,7 +171,7 @@ class Document:
             if each not in given:
                 raise SceneError(f"{tag.place}: <{name}> has no {each}")
         self._ignore(tag, given.keys() - {*other.needed, *other.optional})
-        for inner in tag.children if name != "transform" else ():
+        for inner in tag.children if name not in ("transform", "animation") else ():
             self._losses.note(f"<{inner.name}> cannot be inside <{name}>", inner.place, done="left out")
         value = other.read(self, Child(parent, tag, given, file))
         if other.is_value:
@@ -201,6 +202,25 @@ class Document:
             with self._losses.part(each.place), np.errstate(over="ignore", invalid="ignore"):
                 matrix = product([(each.name, self._substituted(each), each.place)]) @ matrix
         return matrix
+
+    def _animation(self, child: Child) -> Keyframes | Matrix:
+        """Return the motion by transforms that each have a time; what is damaged is left out."""
+        keys: dict[float, Matrix] = {}
+        for each in child.tag.children:
+            with self._losses.part(each.place), placed(each.place):
+                given = self._substituted(each)
+                if each.name != "transform":
+                    raise SceneError(f"<{each.name}> cannot be inside <animation>")
+                (time,) = numbers(each.place, "time", given.get("time", ""), (1,))
+                keys[time] = self._transform(Child(child.parent, each, given, child.file))
+        if not keys:
+            raise SceneError(f"{child.place}: <animation> has no transform with a time")
+        times = sorted(keys)
+        try:
+            return Keyframes(times, [keys[time] for time in times])
+        except SceneError as error:
+            self._losses.note(str(error), child.place, done="the first transform in its place")
+            return keys[times[0]]
 
     def _include(self, child: Child) -> None:
         """Add the content of another file."""
@@ -380,6 +400,7 @@ OTHERS = {
     "vector": Other(_vector, ("name",), ("value", "x", "y", "z")),
     "spectrum": Other(_spectrum, ("name",), ("value", "filename")),
     "transform": Other(Document._transform, ("name",)),
+    "animation": Other(Document._animation, ("name",)),
     "ref": Other(Document._reference, ("id",), ("name",)),
     "include": Other(Document._include, ("filename",), ("name",), is_value=False),
     "alias": Other(Document._alias, ("id", "as"), is_value=False),

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from ...core.errors import SceneError, finite_array
+from ...motion import Motion, Product
 from ...shapes.transform import Matrix, rotation, translation
 from ..description.entity import Entity
 from ..description.placing import in_range
@@ -50,6 +51,17 @@ def to_world(entity: Entity) -> Matrix:
     return entity.or_default(np.eye(4), lambda: _checked(entity, "to_world"))
 
 
+def moved(entity: Entity, made: list[Any]) -> list[Any]:
+    """Return what a plugin has become, moving by its `to_world` where that is a motion."""
+    motion = entity.values.get("to_world")
+    if not isinstance(motion, Motion):
+        return made
+    with entity.lost.part(entity.label, "its motion left out; it stands where it begins"):
+        from_start = Product(motion, np.asarray(np.linalg.inv(motion.at(motion.start)), np.float64))
+        return [each.transformed(from_start) for each in made]
+    return made
+
+
 def plain(value: Any) -> Any:
     """Return the array of a transform of Mitsuba; all else as it is."""
     return value if isinstance(value, Entity) else getattr(value, "matrix", value)
@@ -57,6 +69,7 @@ def plain(value: Any) -> Any:
 
 def _checked(entity: Entity, name: str) -> Matrix:
     value = entity.get(name, np.eye(4))
+    value = value.at(value.start) if isinstance(value, Motion) else value
     matrix = finite_array(name, plain(value), (4, 4))
     if not np.array_equal(matrix[3], [0, 0, 0, 1]):
         if matrix[3, :3].any() or not matrix[3, 3] > 0:

@@ -11,6 +11,7 @@ import numpy as np
 
 from ...arrays.vec import Doubles
 from ...core.errors import SceneError
+from ...motion import Keyframes, Motion, Product
 from ...sampling.filters import GaussianFilter
 from ...shapes.transform import Matrix, rotation, translation
 from ..description.contents import Contents
@@ -65,7 +66,10 @@ class Reader:
         self.shapes: list[Entity] = []
         self.lights: list[Entity] = []
         self.objects: dict[str, list[Entity]] = {}
-        self.uses: dict[str, list[Matrix]] = {}
+        self.uses: dict[str, list[Doubles]] = {}  # places of objects, when they begin and end
+        self.times = (0.0, 1.0)  # of both
+        self.moves = False  # whether anything does
+        self.ends: dict[int, Doubles] = {}  # (2, 4, 4) of entities that move, by their ids
         self.open_object: str | None = None
         self.in_world = False
 
@@ -105,13 +109,18 @@ class Reader:
                 settings |= job.convert(self.options[name])
         every = [*self.shapes, *(entity for each in self.objects.values() for entity in each)]
         job.insides = {entity.state.inside for entity in every}
-        found = [shape for entity in self.shapes for shape in place(entity)]
-        for name, matrices in self.uses.items():
-            found += place_object(self.objects[name], job, np.array(matrices))
-        lamps = [light for entity in self.lights if (light := job.convert(entity)) is not None]
+        found = [self._moved(entity, shape) for entity in self.shapes for shape in place(entity)]
+        for name, uses in self.uses.items():
+            found += self._placed(name, np.array(uses))
+        lamps = [
+            self._moved(entity, light) for entity in self.lights if (light := job.convert(entity)) is not None
+        ]
         lamps = lights.summed(lamps, job.files.losses)
-        view = None if camera is None else job.convert(camera)
+        view = None if camera is None else self._moved(camera, job.convert(camera))
         found = shown(found, lamps, job.files.losses)
+        if self.moves and camera is not None:  # as pbrt shows it
+            open_, close = camera.number("shutteropen", 0.0), camera.number("shutterclose", 1.0)
+            settings |= {"shutter": (open_, close)} if open_ < close else {}
         return Contents(lights=lamps, camera=view, shapes=found, settings=settings, medium=job.around)
 
     def _entity(
@@ -128,10 +137,41 @@ class Reader:
             upgrade(entity)
         return entity
 
-    def _still(self, entity: Entity) -> Entity:
-        """Note if something moves while the shutter is open."""
+    def _moved(self, entity: Entity, made: Any) -> Any:
+        """Return what an entity has become; it moves between its transforms as AnimatedTransform of pbrt."""
+        ends = self.ends.get(id(entity))
+        if ends is None or made is None:
+            return made
+        with self.job.files.losses.part(entity.label, "its motion left out; it stands where it begins"):
+            moving = made.transformed(self._between(ends))
+            self.moves = True
+            return moving
+        return made
+
+    def _between(self, ends: Doubles) -> Motion:
+        """Return the motion from where something stands at its first transform, in the space of the scene."""
+        world = self.job.world
+        return Product(Keyframes(self.times, world @ ends), np.linalg.inv(world @ ends[0]))
+
+    def _placed(self, name: str, uses: Doubles) -> list[Any]:
+        """Return the shapes of an object at all its places (n, 2, 4, 4), when these begin and end."""
+        still = np.array([np.array_equal(*ends) for ends in uses])
+        found: list[Any] = place_object(self.objects[name], self.job, uses[still, 0]) if still.any() else []
+        for ends in uses[~still]:
+            made = place_object(self.objects[name], self.job, ends[:1])
+            with self.job.files.losses.part(f"ObjectInstance {name!r}", "its motion left out"):
+                made = [shape.transformed(self._between(ends)) for shape in made]
+                self.moves = True
+            found += made
+        return found
+
+    def _noted(self, entity: Entity) -> Entity:
+        """Return an entity whose motion is noted: between which transforms it moves, if it does."""
         if not np.array_equal(*self.state.matrices):
-            entity.lose("its motion; it stands where it begins")
+            if self.open_object is None:
+                self.ends[id(entity)] = self.state.matrices
+            else:
+                entity.lose("its motion in an object; it stands where it begins")
         return entity
 
     def _set(self, **changes: Any) -> None:
@@ -207,18 +247,24 @@ class Reader:
             self.job.files.losses.note(f"Option {name!r}", statement.place)
 
     def _TransformTimes(self, statement: Statement) -> None:
-        """Do nothing: what moves is noted."""
+        start, end = statement.numbers
+        if not start < end:
+            raise SceneError(f"TransformTimes is {start:g} {end:g}; the end must be after the start")
+        self.times = float(start), float(end)
 
-    _Accelerator = _TransformTimes
+    def _Accelerator(self, statement: Statement) -> None:
+        """Do nothing: pictures do not depend on it."""
 
     def _option(self, statement: Statement) -> None:
         kind = KINDS.get(statement.name, "filter")
-        entity = self._still(self._entity(kind, statement, "", statement.words[0]))
+        entity = self._entity(kind, statement, "", statement.words[0])
         if statement.name == "Camera":
-            if abs(np.linalg.det(entity.matrix[:3, :3])) < 1e-300:
+            if (np.abs(np.linalg.det(self.state.matrices[:, :3, :3])) < 1e-300).any():
                 raise SceneError("the transform of the camera is singular")
-            entity.matrix = np.asarray(np.linalg.inv(entity.matrix), np.float64)
-            self.spaces["camera"] = np.tile(entity.matrix, (2, 1, 1))
+            places = np.asarray(np.linalg.inv(self.state.matrices), np.float64)
+            entity.matrix, self.spaces["camera"] = places[0], places
+            if not np.array_equal(*places):
+                self.ends[id(entity)] = places
         self.options[statement.name] = entity
 
     _Camera = _Film = _Sampler = _Integrator = _PixelFilter = _option
@@ -259,13 +305,13 @@ class Reader:
         self._set(inside=statement.words[0], outside=statement.words[-1])
 
     def _LightSource(self, statement: Statement) -> None:
-        self.lights.append(self._still(self._entity("light", statement, "light", statement.words[0])))
+        self.lights.append(self._noted(self._entity("light", statement, "light", statement.words[0])))
 
     def _AreaLightSource(self, statement: Statement) -> None:
         self._set(area=self._entity("area light", statement, "light", statement.words[0]))
 
     def _Shape(self, statement: Statement) -> None:
-        entity = self._still(self._entity("shape", statement, "shape", statement.words[0]))
+        entity = self._noted(self._entity("shape", statement, "shape", statement.words[0]))
         (self.shapes if self.open_object is None else self.objects[self.open_object]).append(entity)
 
     def _ObjectBegin(self, statement: Statement) -> None:
@@ -287,7 +333,7 @@ class Reader:
             raise SceneError("ObjectInstance is inside an object")
         if name not in self.objects:
             raise SceneError(f"there is no object {name!r}")
-        self.uses.setdefault(name, []).append(self.state.matrices[0])
+        self.uses.setdefault(name, []).append(self.state.matrices)
 
 
 def read_scene(files: SceneFiles, data: bytes, read_mesh: Callable[[Path], list[RawMesh]]) -> Contents:

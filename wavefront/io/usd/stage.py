@@ -42,7 +42,7 @@ HARMLESS = ("Scope", "Xform", "Material", "Shader", "NodeGraph", "GeomSubset", "
 
 
 def read_usd(files: SceneFiles, time: float | None = None) -> Contents:
-    """Return the contents of a file of USD (.usd, .usda, .usdc, .usdz) at a time code, by default the first.
+    """Return the contents of a file of USD (.usd, .usda, .usdc, .usdz) at a time, s; by default the first.
 
     It is read by a process of its own.
 
@@ -122,11 +122,37 @@ class _Prototype:
     tint: Tint
 
 
+def _time_codes(stage: Any) -> tuple[float, float] | None:
+    """Return the first and the last time code of a stage; None where nothing changes."""
+    from pxr import Usd
+
+    ranges = [stage.Traverse(), *(Usd.PrimRange(each) for each in stage.GetPrototypes())]
+    varying = [
+        attribute
+        for prims in ranges
+        for prim in prims
+        for attribute in prim.GetAuthoredAttributes()
+        if attribute.ValueMightBeTimeVarying()
+    ]
+    if not varying:
+        return None
+    if stage.HasAuthoredTimeCodeRange():
+        return stage.GetStartTimeCode(), stage.GetEndTimeCode()
+    samples = [code for attribute in varying for code in attribute.GetTimeSamples()]
+    return (min(samples), max(samples)) if samples else None
+
+
 class _Reader:
     def __init__(self, files: SceneFiles, stage: Any, time: float | None) -> None:
         from pxr import Usd, UsdGeom
 
-        start = stage.GetStartTimeCode() if time is None and stage.HasAuthoredTimeCodeRange() else time
+        self.rate = stage.GetTimeCodesPerSecond() or 24.0
+        self.codes = _time_codes(stage)
+        start = None if time is None else time * self.rate
+        if start is None and stage.HasAuthoredTimeCodeRange():
+            start = stage.GetStartTimeCode()
+        elif start is None and self.codes is not None:
+            start = self.codes[0]
         self.time = Usd.TimeCode.Default() if start is None else Usd.TimeCode(start)
         self.files, self.stage, self.cache = files, stage, UsdGeom.XformCache(self.time)
         self.materials = Materials(files, self.time, self.lose)
@@ -173,7 +199,8 @@ class _Reader:
             parts = zip(materials, counts, strict=True)
             places.materials = [made for made, count in parts for _ in range(count)]
         up = str(UsdGeom.GetStageUpAxis(self.stage)).lower()
-        return Contents(self.raws, places, self.lights, self.camera, self.shapes, up=up)
+        span = None if self.codes is None else (self.codes[0] / self.rate, self.codes[1] / self.rate)
+        return Contents(self.raws, places, self.lights, self.camera, self.shapes, up=up, span=span)
 
     def _count(self, top: Any, above: tuple[str, ...]) -> int:
         """Return how much is placed with a prim, before any is: instancers may place instancers.

@@ -1,0 +1,140 @@
+"""Stages of USD whose attributes have time samples: each moment is read from the file."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+import wavefront as wf
+
+pytest.importorskip("pxr")
+
+HEAD = """#usda 1.0
+(
+    metersPerUnit = 1
+    upAxis = "Y"
+    startTimeCode = 10
+    endTimeCode = 30
+    timeCodesPerSecond = 10
+)
+"""
+BOARD = """def Mesh "%s"
+{
+    int[] faceVertexCounts = [3]
+    int[] faceVertexIndices = [0, 1, 2]
+    %s
+    uniform token subdivisionScheme = "none"
+}
+"""
+STILL = BOARD % ("still", "point3f[] points = [(0, 0, 0), (1, 0, 0), (0, 1, 0)]")
+BENT = BOARD % (
+    "bent",
+    """point3f[] points.timeSamples = {
+        10: [(0, 0, 0), (1, 0, 0), (0, 1, 0)], 30: [(0, 0, 4), (1, 0, 0), (0, 1, 0)] }""",
+)
+SLID = """def Xform "slid"
+{
+    double3 xformOp:translate.timeSamples = { 10: (0, 0, 0), 20: (2, 0, 0), 30: (2, 6, 0) }
+    uniform token[] xformOpOrder = ["xformOp:translate"]
+    def Sphere "ball"
+    {
+        double radius = 1
+    }
+}
+"""
+BLINKS = """def Sphere "blinks"
+{
+    token visibility.timeSamples = { 10: "inherited", 20: "invisible" }
+}
+"""
+LAMP = """def SphereLight "lamp"
+{
+    float inputs:intensity.timeSamples = { 10: 1, 30: 3 }
+    double3 xformOp:translate.timeSamples = { 10: (0, 5, 0), 30: (4, 5, 0) }
+    uniform token[] xformOpOrder = ["xformOp:translate"]
+}
+"""
+CAMERA = """def Camera "camera"
+{
+    float focalLength.timeSamples = { 10: 50, 30: 100 }
+    double3 xformOp:translate.timeSamples = { 10: (0, 0, 5), 30: (0, 0, 9) }
+    uniform token[] xformOpOrder = ["xformOp:translate"]
+}
+"""
+
+
+def stage(folder: Path, body: str, head: str = HEAD) -> Path:
+    path = folder / "a.usda"
+    path.write_text(head + body)
+    return path
+
+
+def named(scene: wf.Scene) -> dict[str, Any]:
+    return {shape.name: shape for shape in scene.shapes}
+
+
+def test_what_has_time_samples_moves(tmp_path: Path) -> None:
+    scene = wf.load(stage(tmp_path, STILL + BENT + SLID + BLINKS + LAMP + CAMERA))
+    assert (scene.start, scene.end, scene.duration) == (1, 3, 2)
+    assert scene.moves
+    start, middle = named(scene), named(scene.at(1.5))
+    assert start["ball"].center.tolist() == [0, 0, 0]
+    assert middle["ball"].center.tolist() == [1, 0, 0]
+    assert named(scene.at(2.5))["ball"].center.tolist() == [2, 3, 0]
+    np.testing.assert_allclose(middle["bent"].vertices[0], [0, 0, 1])
+    assert "blinks" in start
+    assert "blinks" in middle
+    later = scene.at(2)
+    assert "blinks" not in named(later)
+    np.testing.assert_allclose(named(later)["lamp"].center, [2, 5, 0])
+    np.testing.assert_allclose(named(later)["lamp"].emission, 2 * start["lamp"].emission)
+    assert later.camera is not None
+    assert later.camera.origin.tolist() == [0, 0, 7]
+    assert later.camera.fov == pytest.approx(2 * np.degrees(np.arctan(15.2908 / 150)))
+    assert not later.moves
+    assert later.moment == 2
+
+
+def test_what_stands_still_is_shared(tmp_path: Path) -> None:
+    scene = wf.load(stage(tmp_path, STILL + SLID))
+    still = scene.at(2)
+    assert named(still)["still"] is named(scene)["still"]
+    assert named(still)["ball"] is not named(scene)["ball"]
+    added = wf.Box((0, 0, 0), 1).transformed(wf.Keyframes([1, 2], [np.eye(4), np.diag([2, 2, 2, 1])]))
+    camera = wf.Camera.look_at((0, 0, 9), (0, 0, 0))
+    scene.add(added, wf.PointLight((0, 1, 0), 3))
+    scene.camera = camera
+    still = scene.at(2)
+    assert still.shapes[-1].bounds.tolist() == [[-1, -1, -1], [1, 1, 1]]
+    assert still.lights == scene.lights
+    assert still.camera is camera
+
+
+def test_a_moment_is_what_is_read_at_its_time(tmp_path: Path) -> None:
+    path = stage(tmp_path, STILL + BENT + LAMP)
+    given: Any = {"spp": 2, "size": (12, 8), "progress": False, "workers": 1, "view": "front"}
+    frames = list(wf.render_frames(path, [1, 2], **given))
+    scene = wf.load(path)
+    for time, image in zip((1, 2), frames, strict=True):
+        np.testing.assert_array_equal(image.rgb, wf.render(scene.at(time), **given).rgb)
+    np.testing.assert_array_equal(
+        named(wf.load(path, time=2))["bent"].vertices, named(scene.at(2))["bent"].vertices
+    )
+    assert wf.load(path, time=2).moves is False
+
+
+def test_times_are_seconds_also_without_a_range(tmp_path: Path) -> None:
+    scene = wf.load(stage(tmp_path, SLID, '#usda 1.0\n(metersPerUnit = 1\nupAxis = "Y")\n'))
+    assert (scene.start, scene.end) == (10 / 24, 30 / 24)
+    assert named(scene.at(15 / 24))["ball"].center.tolist() == [1, 0, 0]
+    assert not wf.load(stage(tmp_path, STILL)).moves
+
+
+def test_framing_and_ground_are_those_of_all_times(tmp_path: Path) -> None:
+    scene = wf.load(stage(tmp_path, SLID))
+    np.testing.assert_allclose(scene.at(1).reach, [[-1, -1, -1], [3, 7, 1]])
+    first, last = (scene.at(at).framing_camera() for at in (1, 3))
+    np.testing.assert_array_equal(first.to_matrix(), last.to_matrix())

@@ -1,0 +1,68 @@
+"""Scenes of files that are read anew for each time, as those of USD, whose attributes all may change."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from ..camera import Camera
+from ..core.errors import SceneError
+from ..core.fingerprint import fingerprint
+from ..lights import Light
+from ..shapes import Shape
+
+FEW = 5  # times that say how far a scene reaches
+
+if TYPE_CHECKING:
+    from .scene import Scene
+
+
+class FileMoments:
+    """What of a scene is that of its file, and how the file is read at other times.
+
+    Parameters
+    ----------
+    read
+        Returns the scene of a time, seconds.
+    span
+        From when to when the file moves, seconds.
+    scene
+        As it was read for its start.
+    """
+
+    def __init__(self, read: Callable[[float], Scene], span: tuple[float, float], scene: Scene) -> None:
+        self._read, self.span = read, span
+        self._shapes, self._lights, self._camera = list(scene.shapes), list(scene.lights), scene.camera
+        parts: list[Any] = [*self._shapes, *self._lights]
+        self._known = {key: each for each in parts if (key := _made_of(each)) is not None}
+        self._mine = {id(each) for each in parts}
+        self._samples: list[Scene] = []
+
+    def samples(self, scene: Scene) -> list[Scene]:
+        """Return the scene at a few times, which say how far it reaches, read once."""
+        if not self._samples:
+            self._samples = [scene.at(time) for time in np.linspace(*self.span, FEW)]
+        return self._samples
+
+    def at(self, scene: Scene, time: float) -> tuple[list[Shape], list[Light], Camera | None]:
+        """Return shapes, lights and camera of a time: those of the file, and what was added to the scene.
+
+        What has not changed is the object of the scene itself, with its textures and tables.
+        """
+        fresh, mine = self._read(time), self._mine
+        shapes = [self._known.get(_made_of(each) or "", each) for each in fresh.shapes]
+        lights = [self._known.get(_made_of(each) or "", each) for each in fresh.lights]
+        shapes += [each.at(time) for each in scene.shapes if id(each) not in mine]
+        lights += [each.at(time) for each in scene.lights if id(each) not in mine]
+        own = scene.camera is self._camera
+        return shapes, lights, fresh.camera if own else scene.camera and scene.camera.at(time)
+
+
+def _made_of(part: Shape | Light) -> str | None:
+    """Return what differs between shapes or lights that differ; None where that cannot be said."""
+    try:
+        return fingerprint("a part of a file", part)
+    except SceneError:
+        return None
