@@ -8,6 +8,12 @@ from scipy import integrate, stats
 from significance import ALPHA, render, smallest_p
 
 import wavefront as wf
+from wavefront.accel import make_accelerator
+from wavefront.features.compiling import compile_scene
+from wavefront.features.view import seen_by
+from wavefront.motion.shutter import Shutter
+from wavefront.sampling.sampler import make_sampler
+from wavefront.stages.generate import generate
 
 OPTIONS = {"ground": False, "lighting": None, "branches": 1, "reuse": False}
 
@@ -125,7 +131,7 @@ def test_blurred_picture_is_the_mean_of_stills(name):
 @pytest.mark.parametrize("accel", ["numpy", "embree"])
 @pytest.mark.parametrize("name", SCENES)
 def test_blurred_pictures_are_means_of_stills(name, accel):
-    assert_mean_of_stills(SCENES[name], runs=16, strata=64, spp=128, accel=accel)
+    assert_mean_of_stills(SCENES[name], runs=6, strata=64, spp=64, still_spp=1, accel=accel)
 
 
 def coverage(edges, width, way):
@@ -183,6 +189,40 @@ def test_alpha_of_a_disk_that_crosses_pixels_is_a_trapezoid():
     assert_columns((runs.mean(0), runs.std(0, ddof=1) / 8), expected)
 
 
+def mean_of_floor(scene, spp, **options):
+    """The mean and the standard error of batches of a picture, by rows of pixels."""
+    image = render(scene, spp, **OPTIONS, **options).rgb.astype(float).mean(2)
+    rows = image.mean(1)
+    return rows.mean(), rows.std(ddof=1) / np.sqrt(rows.size)
+
+
+def test_lamp_that_moves_over_a_table():
+    """The irradiance is the mean of I cosθ / d² over the way, by quadrature; and that of a small sphere."""
+    table = wf.Rectangle((-0.01, 0, 0.01), (0.02, 0, 0), (0, 0, -0.02), material=wf.Diffuse(0.5))
+    camera = wf.Camera.orthographic((0, 1, 0), (0, 0, 0), up=(0, 0, 1), height=0.01, size=(4, 32))
+    slide = wf.Keyframes([0, 1], [placed((-1, 0, 0)), placed((2, 0, 0))])
+    lamp = wf.PointLight((0, 1.5, 0.5), 4).transformed(slide)
+    bulb = wf.Sphere((0, 1.5, 0.5), 0.1, emission=4 / (np.pi * 0.01)).transformed(slide)
+    exact = integrate.quad(lambda x: 4 * 1.5 / (x * x + 1.5**2 + 0.25) ** 1.5, -1, 2)[0] / 3 * 0.5 / np.pi
+    for scene in (wf.Scene([table], lamp, camera), wf.Scene([table, bulb], [], camera)):
+        mean, error = mean_of_floor(scene, 64, shutter=(0, 1), max_bounces=1)
+        assert error < 0.01 * exact
+        assert abs(mean - exact) < 4 * error
+
+
+def test_mirror_that_turns_shows_a_bar_as_long_as_it_does():
+    """A ray comes back turned by twice the angle: it meets the bar for a part of the time."""
+    mirror = wf.Rectangle((-1, -1, 0), (2, 0, 0), (0, 2, 0), material=wf.Mirror())
+    turn = wf.Keyframes([0, 1], [placed(degrees=-20), placed(degrees=25)])
+    low, high = np.tan(np.radians([10, 40]))  # of the bar, seen from the middle of the mirror
+    bar = wf.Rectangle((low * 3, -9, 3), (0, 18, 0), (high * 3 - low * 3, 0, 0), emission=1, two_sided=True)
+    camera = wf.Camera.look_at((0, 0, 4), (0, 0, 0), fov=0.01, size=(4, 64))
+    scene = wf.Scene([mirror.transformed(turn), bar], [], camera)
+    mean, error = mean_of_floor(scene, 64, shutter=(0, 1), max_bounces=1)
+    assert error < 0.01
+    assert abs(mean - 15 / 45) < 4 * error
+
+
 def test_shutter_curve_weighs_times():
     bar = wf.Rectangle((-24, -99, 0), (20, 0, 0), (0, 198, 0))  # its edge crosses the picture
     slide = wf.Keyframes([0, 1], [placed(), placed((8, 0, 0))])
@@ -234,3 +274,86 @@ def test_shared_paths_are_refused_where_something_moves():
         with pytest.raises(wf.SceneError, match="move while the shutter is open"):
             render(SCENES[name], 1, **options)
     render(SCENES["camera"], 1, **options)
+
+
+def test_trace_shows_the_time_of_each_path():
+    trace = wf.trace(SCENES["instance"], shutter=(0.2, 0.4))
+    step = next(each for each in trace if each.stage == "generate")
+    time = step.paths.time
+    assert time.dtype == np.float64
+    assert 0.2 <= time.min() < 0.21 < 0.39 < time.max() <= 0.4
+    path = wf.trace(SCENES["instance"], shutter=(0.2, 0.4)).path((3, 2))
+    assert path.time == time[2 * 16 + 3]
+    assert f"at {path.time:.6g} s" in repr(path)
+
+
+def test_times_of_a_pixel_are_stratified():
+    camera = view(4)
+    sampler = make_sampler("sobol", 3, 4)
+    compiled = compile_scene(wf.Scene([floor()]), lambda geometry: make_accelerator(geometry, "numpy"))
+    seen = seen_by(compiled, SCENES["camera"].camera, Shutter(0, 1))
+    paths = generate(seen, camera, sampler, np.full(64, 5, np.uint32), np.arange(64, dtype=np.uint32))
+    assert sorted(np.floor(paths.time * 64)) == list(range(64))
+
+
+# --- With all else -----------------------------------------------------------------------------------
+
+
+def filled(bsdf, **medium):
+    return wf.Material(bsdf, interior=wf.Medium(**medium))
+
+
+def mixed_scene():
+    """What moves, and what light does beside it, by name: scenes and settings."""
+    box, ball = wf.Box((0, 0, 0), 0.8), wf.Sphere((0, 0, 0), 0.5)
+    glass, gold = wf.Dielectric(1.5), wf.Conductor("gold", roughness=0.3)
+    amber, fog = filled(glass, absorption=(0.2, 1, 3)), filled(wf.NullSurface(), scattering=2)
+    lamp = wf.Rectangle((-0.6, 2, -0.6), (1.2, 0, 0), (0, 0, 1.2), emission=6)
+    leaf = wf.Material(wf.Diffuse(0.5), alpha=0.5)
+    catcher = wf.Rectangle((-3, -0.6, 3), (6, 0, 0), (0, 0, -6), material=wf.ShadowCatcher())
+
+    def of(*shapes, **settings):
+        return wf.Scene([floor(), lamp, *shapes], [], view()), settings
+
+    def carried(shape, material):
+        shape = shape.transformed(TURN)
+        shape.material = material
+        return shape
+
+    walls = wf.Box((0, 1.4, 0), 4, material=wf.Diffuse(0.7))
+    return {
+        "glass": of(carried(box, glass)),
+        "gold": of(carried(ball, gold)),
+        "absorbing": of(carried(box, amber)),
+        "fog": of(carried(ball, fog)),
+        "in fog": (
+            wf.Scene([floor(), lamp, carried(box, gold)], [], view(), medium=wf.Medium(scattering=0.1)),
+            {},
+        ),
+        "alpha": of(carried(box, leaf)),
+        "catcher": (wf.Scene([catcher, carried(box, gold)], lights(), view()), {}),
+        "guide": of(carried(box, gold), guide=True),
+        "branches": of(carried(box, gold), branches=4),
+        "caustics": of(carried(box, gold), wf.Sphere((-1, 0.3, 0), 0.5, material=glass), caustics=True),
+        "camera in glass": (
+            wf.Scene([floor(), lamp, carried(ball, fog)], [], view(origin=(0.4, 0.1, 0.2))),
+            {},
+        ),
+        "lamp in a room": (wf.Scene([walls, lamp.transformed(SLIDE)], [], view(origin=(0, 1, 1.8))), {}),
+        "direct": of(carried(box, gold), integrator="direct_mis"),
+        "naive": of(carried(box, gold), integrator="naive"),
+    }
+
+
+MIXED = mixed_scene()
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("accel", ["numpy", "embree"])
+@pytest.mark.parametrize("name", MIXED)
+def test_blurred_pictures_are_means_of_stills_with_all_else(name, accel):
+    scene, settings = MIXED[name]
+    strata = 16 if "guide" in settings else 64  # each still has a training of its own
+    assert_mean_of_stills(
+        scene, runs=6, strata=strata, spp=64, still_spp=64 // strata, accel=accel, max_error=0.05, **settings
+    )

@@ -417,6 +417,12 @@ def _swept_boxes(motions: Motions, low: Doubles, high: Doubles) -> tuple[Floats,
     return np.stack(lows, 1).astype(f4), np.stack(highs, 1).astype(f4)
 
 
+def with_places(bounds: Doubles, placements: Placements) -> Doubles:
+    """Return corners (2, 3) of a box that holds another one, and all places of instances."""
+    low, high = placements.low.min(1), placements.high.max(1)
+    return np.stack([np.minimum(bounds[0], low), np.maximum(bounds[1], high)])
+
+
 def place_accelerators(
     single: Accelerator,
     triangles: Sequence[Floats],

@@ -7,25 +7,28 @@ from collections.abc import Iterator
 import numpy as np
 
 from ..arrays.vec import Floats, Ints
-from ..core.errors import SceneError
+from ..core.errors import SceneError, warn_caller
 from ..lights import InfiniteLight, Light, LightRecord
 from ..lights.moving import DeformingLights, MovingLights
 from ..motion.steps import Motions
 from .motion import DeformingRows, MotionTable
 
 
-def moving_light(light: Light, record: LightRecord, motions: Motions | None, number: int) -> MovingLights:
+def moving_light(light: Light, record: LightRecord, motions: Motions | None, number: int) -> LightRecord:
     """Return a light, given by its record in the middle of the time, as it moves.
+
+    Those that fill a part of the sky stay as they are then, and a warning says so.
 
     Raises
     ------
     SceneError
-        If it is one at infinity, or of a surface.
+        If it is one of a surface.
     """
-    if isinstance(record, InfiniteLight) or light.shape is not None or motions is None:
-        raise SceneError(
-            f"{type(light).__name__} moves while the shutter is open; only lights at a place and shapes can"
-        )
+    if light.shape is not None:
+        raise SceneError(f"{type(light).__name__} moves while the shutter is open; move its shape instead")
+    if isinstance(record, InfiniteLight) or motions is None:
+        warn_caller(f"{type(light).__name__} turns while the shutter is open; it is shown as in the middle")
+        return record
     return MovingLights(record, np.full(len(record), number), motions, type(record))
 
 

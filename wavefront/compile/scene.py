@@ -35,7 +35,14 @@ from .materials import (
 )
 from .media import MediaTable, glow_lights, media_of, media_table, phase_materials
 from .morton import AnyOrder, MortonGrid
-from .motion import MotionTable, curved_that_move, light_motions, motion_table, place_accelerators
+from .motion import (
+    MotionTable,
+    curved_that_move,
+    light_motions,
+    motion_table,
+    place_accelerators,
+    with_places,
+)
 from .moving_curved import with_curved
 from .program import Facts, Program
 from .scale import check_distance, check_lights, length_factor, scaled_shapes
@@ -191,6 +198,8 @@ def gather_scene(
             once,
             len(material_of),
         )
+    if media is not None and placements is not None and motion is not None:
+        media.bounds = with_places(media.bounds, placements)
     lights, numbered, light_of, environment = gather_lights(
         scene,
         scaled,

@@ -53,6 +53,7 @@ class ShadingInMedia(Shading):
         bounce: int,
     ) -> None:
         """Note what shadow rays begin inside of."""
+        super().enter(scene, rays, paths, lanes, light, cos_g, sampler, bounce)
         stack = paths.media[:, : cos_g.size]
         if self.crossing is not None:
             stack = stacks_leaving(stack, self.crossing, cos_g)

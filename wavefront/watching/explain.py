@@ -13,7 +13,20 @@ from ..image import Image
 from .path import PathVertices
 from .trace import Pixel, Wave
 
-SETTINGS = ("seed", "sampler", "integrator", "max_bounces", "light_sampler", "filter", "roulette")
+SETTINGS = (
+    *("seed", "sampler", "integrator", "max_bounces", "light_sampler", "filter", "roulette"),
+    *("shutter", "shutter_curve"),
+)
+    "seed",
+    "sampler",
+    "integrator",
+    "max_bounces",
+    "light_sampler",
+    "filter",
+    "roulette",
+    "shutter",
+    "shutter_curve",
+)
 # paths that are not alone, or light that is cut
 CHANGED = {"branches": 1, "reuse": False, "guided": False, "caustics": False, "clamp": None}
 

@@ -102,6 +102,8 @@ class PathVertices(Sequence[Vertex]):
         (3,) the light of the sample, which is the sum of `Vertex.light`.
     camera
         (3,) where the path starts.
+    time
+        Of the path, seconds of the scene; None where nothing moves while the shutter is open.
 
     Examples
     --------
@@ -122,9 +124,10 @@ class PathVertices(Sequence[Vertex]):
         sample: int,
         radiance: Doubles,
         camera: Doubles,
+        time: float | None = None,
     ) -> None:
         self._vertices, self.pixel, self.sample = tuple(vertices), pixel, sample
-        self.radiance, self.camera = radiance, camera
+        self.radiance, self.camera, self.time = radiance, camera, time
 
     def __len__(self) -> int:
         """Return how many vertices the path has."""
@@ -148,7 +151,8 @@ class PathVertices(Sequence[Vertex]):
         return table_html(self._title(), rows)
 
     def _title(self) -> str:
-        return f"pixel {self.pixel}, sample {self.sample}: radiance {_numbers(self.radiance)}"
+        when = "" if self.time is None else f" at {self.time:.6g} s"
+        return f"pixel {self.pixel}, sample {self.sample}{when}: radiance {_numbers(self.radiance)}"
 
     def shapes(self, radius: float) -> list[Shape]:
         """Return the path as `Capsules` to be added to its scene, and its light samples in another color.
@@ -216,11 +220,13 @@ class VertexRecorder(PathRecorder):
         self._scene, self._shapes = scene, shapes
         self._seen: list[dict[str, Any]] = []
         self._camera = np.zeros(3)
+        self._time: float | None = None
 
     def stage(self, name: str, leg: Leg) -> None:
         """Note how the path has left its last surface, before anything acts on the way."""
         if not self._seen:
             self._camera = _column(world_points(self._scene, leg.paths.origin))
+            self._time = None if leg.paths.time is None else float(leg.paths.time[0])
         elif len(leg.paths):
             before = self._seen[-1]
             left, now = before["throughput"] * before["factor"], _column(leg.paths.throughput)
@@ -319,7 +325,12 @@ class VertexRecorder(PathRecorder):
     def vertices(self, pixel: tuple[int, int], sample: int, radiance: Floats) -> PathVertices:
         """Return what has been noted."""
         return PathVertices(
-            [Vertex(**each) for each in self._seen], pixel, sample, radiance.astype(np.float64), self._camera
+            [Vertex(**each) for each in self._seen],
+            pixel,
+            sample,
+            radiance.astype(np.float64),
+            self._camera,
+            self._time,
         )
 
 

@@ -36,6 +36,7 @@ def trace(
     pixels: Sequence[Pixel] | None = None,
     max_bounces: int | None = None,
     integrator: Any = "full",
+    shutter: tuple[float, float] | None = None,
 ) -> Trace:
     """Go through the loop of a render stage by stage, with one sample of each pixel.
 
@@ -44,8 +45,8 @@ def trace(
 
     Parameters
     ----------
-    scene, size, seed, max_bounces, integrator
-        As for `render`.
+    scene, size, seed, max_bounces, integrator, shutter
+        As for `render`; with a shutter, `step.paths.time` has the time of each path.
     sample
         Which sample of each pixel.
     pixels
@@ -76,7 +77,8 @@ def trace(
     <Step 'compact', bounce 1: 0 paths>
     <Step 'end', bounce 1: 0 paths>
     """
-    given = {} if max_bounces is None else {"max_bounces": max_bounces}
+    given: dict[str, Any] = {} if max_bounces is None else {"max_bounces": max_bounces}
+    given |= {} if shutter is None else {"shutter": shutter}
     wave = Wave(scene, size=size, seed=seed, integrator=integrator, **given)
     at = number("trace: sample", sample, lambda x: 0 <= x < 1 << 32 and x == int(x), "an integer in [0, 2³²)")
     return Trace(wave, wave.numbers(pixels), int(at))
