@@ -14,9 +14,6 @@ from .path import PathVertices
 from .trace import Pixel, Wave
 
 SETTINGS = (
-    *("seed", "sampler", "integrator", "max_bounces", "light_sampler", "filter", "roulette"),
-    *("shutter", "shutter_curve"),
-)
     "seed",
     "sampler",
     "integrator",
