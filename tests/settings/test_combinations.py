@@ -15,7 +15,7 @@ import wavefront as wf
 from wavefront.drive import choice
 from wavefront.sampling import tiles
 from wavefront.settings import SETTINGS
-from wavefront.settings.checks import EXCLUSIONS, MEDIA, MOVING, SETTING_OF, Exclusion, table
+from wavefront.settings.checks import EXCLUSIONS, MEDIA, MOVING, ROLLING, SETTING_OF, Exclusion, table
 
 CAMERA = wf.Camera.look_at((3, 2, 4), (0, 0, 0), fov=45, size=(8, 8))
 ANOTHER = "another integrator"
@@ -68,7 +68,7 @@ VALUES: dict[str, Any] = {  # of each setting, one that is not its default
 }
 USUAL = {"size": (8, 8), "max_bounces": 4, "lighting": "cloudy", "workers": 1, "progress": False}
 OF_SETTINGS = [
-    each for each in EXCLUSIONS if each.other not in (MEDIA, MOVING)
+    each for each in EXCLUSIONS if each.other not in (MEDIA, MOVING, ROLLING)
 ]  # tests/media has those of scenes
 NAMED = {name for each in EXCLUSIONS for name in (each.one, each.other)}
 QUICK = [name for name in VALUES if name in NAMED and name not in ("guide", "material")]

@@ -6,6 +6,7 @@ Nothing in them is random or filtered. A surface with alpha is met where its opa
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -22,6 +23,7 @@ from ..shapes import Instance, Mesh, Shape
 from ..stages.generate import center_rays
 from ..stages.interaction import interaction
 from ..stages.passing import covering_hits
+from .carried import weights_on
 
 RAYS_AT_ONCE = 1 << 16
 IDS = {"shape_id": "shape", "instance_id": "instance", "material_id": "material"}
@@ -150,7 +152,8 @@ def _found(
     if "distance" in names:
         yield "distance", distance
     if "depth" in names:
-        yield "depth", camera.project(point)[1]
+        time = center.time
+        yield "depth", camera.project(point)[1] if time is None else camera.project_at(point, time)[1]
     if corners is not None:
         uv = corners.uv(shape, scene.shape_numbers.face(hits), point)
         curved = np.flatnonzero(hits.prim >= scene.triangles)
@@ -205,25 +208,9 @@ class _Corners:
     def _uv(self, mesh: Shape, shape: Ints, face: Ints, point: Doubles) -> Doubles:
         if not isinstance(mesh, Mesh) or mesh.uvs is None:
             return np.full((len(point), 2), np.nan)
-        (b1, b2), beyond = self._on_faces(mesh, shape, face, point)
-        following = np.minimum(face + 1, len(mesh.faces) - 1)
-        other, further = self._on_faces(mesh, shape, following, point)
-        # of a flat quadrilateral whose halves look alike, the first half may have been reported
-        second = _are_quads(mesh, face, following) & (further < beyond)
-        face, b1, b2 = (
-            np.where(second, then, now) for then, now in ((following, face), (other[0], b1), (other[1], b2))
-        )
+        face, b1, b2 = weights_on(mesh.faces, mesh.vertices, face, point, partial(self._placed, shape))
         at_a, at_b, at_c = mesh.uvs.take(mesh.faces.take(face, 0), 0).transpose(1, 2, 0)
         return (at_a + (at_b - at_a) * b1 + (at_c - at_a) * b2).T
-
-    def _on_faces(
-        self, mesh: Mesh, shape: Ints, face: Ints, point: Doubles
-    ) -> tuple[tuple[Doubles, Doubles], Doubles]:
-        """Return the barycentric weights (n,) of points (n, 3) on faces, and how far they are outside."""
-        corners = mesh.vertices.take(mesh.faces.take(face, 0), 0).transpose(1, 2, 0)
-        a, b, c = (self._placed(shape, corner) for corner in corners)
-        b1, b2 = _weights(a, b, c, point.T)
-        return (b1, b2), np.maximum(np.maximum(-b1, -b2), b1 + b2 - 1)
 
     def _placed(self, number: Ints, vertex: Doubles) -> Doubles:
         """Return vertices (3, n) of the meshes of shapes (n,) in the scene."""
@@ -236,18 +223,3 @@ class _Corners:
         m = m.take(lane, 0).transpose(1, 2, 0)
         x, y, z = vertex
         return np.stack([row[0] * x + row[1] * y + row[2] * z + row[3] for row in m[:3]])
-
-
-def _are_quads(mesh: Mesh, face: Ints, following: Ints) -> Bools:
-    """Return whether faces (n,) are fans with those that follow: see `shapes/fans.py`."""
-    (a, _, c), (p, q, _) = (mesh.vertices.take(mesh.faces.take(each, 0).T, 0) for each in (face, following))
-    return ((a == p) & (c == q)).all(1)
-
-
-def _weights(a: Doubles, b: Doubles, c: Doubles, point: Doubles) -> tuple[Doubles, Doubles]:
-    """Return the barycentric weights (n,) of b and c at points (3, n) of triangles; 0 without an area."""
-    u, v, w = b - a, c - a, point - a
-    uu, uv, vv, wu, wv = dot(u, u), dot(u, v), dot(v, v), dot(w, u), dot(w, v)
-    area = uu * vv - uv * uv
-    area = np.where(area > 0, area, np.inf)
-    return (vv * wu - uv * wv) / area, (uu * wv - uv * wu) / area

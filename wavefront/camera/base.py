@@ -28,6 +28,7 @@ from ..motion import Motion, Moving, product
 from ..sampling.tiles import PictureTiles, Tiles
 from .distortion import Distortion
 from .fisheye import Fisheye
+from .poses import upright
 from .projection import Orthographic, Panorama, Perspective, Projection
 
 MAX_SIDE = 65_536  # pixels; a row-major pixel index then fits in 32 bits
@@ -63,6 +64,8 @@ class Camera(Moving, Answers):
     window
         (x0, y0, x1, y1) in pixels of the whole picture: the part that is rendered. Column x1 and row y1 are
         not part of it.
+    rolling_shutter
+        Seconds in which the sensor is read, row by row from the top; negative from the bottom, 0 at once.
     motion, moves, time_span
         Where it goes, a `Motion` from camera space ("opengl") to the world (None: nowhere); whether it moves,
         and from when to when, seconds. Its origin and rotation are those of its start; `at` gives other
@@ -78,6 +81,8 @@ class Camera(Moving, Answers):
 
     sensor: str | None = None  # what is measured at each pixel; None where pixels are parts of a picture
     scatterings: int = 0  # of each path before it leaves the camera
+    rolling_shutter: float = 0.0
+    course: Motion | None = None  # of which `at` has made a moment
 
     @suggests_keywords
     def __init__(
@@ -87,6 +92,8 @@ class Camera(Moving, Answers):
         projection: Projection,
         size: ImageSize,
         crop: Window | None = None,
+        *,
+        rolling_shutter: float = 0.0,
     ) -> None:
         self.origin = finite_array("Camera origin", origin, (3,))
         self.rotation = rotation_matrix("Camera rotation", rotation)
@@ -96,6 +103,8 @@ class Camera(Moving, Answers):
         self.resolution = image_size(size)
         projection.check(self.resolution)
         self.window = _window(crop, self.resolution)
+        if rolling_shutter:  # others have the same fingerprint as without this parameter
+            self.rolling_shutter = number("Camera rolling_shutter", rolling_shutter)
 
     def __repr__(self) -> str:
         """Name the projection, where the camera stands and where it looks, and the size."""
@@ -447,6 +456,7 @@ class Camera(Moving, Answers):
         height: float | None = None,
         projection: Projection | None = None,
         crop: Window | None = None,
+        rolling_shutter: float | None = None,
     ) -> Camera:
         """Return a camera of which some things differ; what is not given stays.
 
@@ -464,6 +474,10 @@ class Camera(Moving, Answers):
             As of `orthographic`.
         projection
             Another map from points of the film to rays, such as `Fisheye`, or one of your own.
+        rolling_shutter
+            Seconds in which the rows of the sensor are read, from the top, as of most phones and robots;
+            negative from the bottom. Of h rows, row r is exposed r·rolling_shutter/h later than `shutter`
+            says.
 
         Raises
         ------
@@ -490,7 +504,9 @@ class Camera(Moving, Answers):
         chosen = base.replaced(**lens) if lens else base
         window = self.window if size is None and crop is None else crop
         camera = Camera(eye, axes, chosen, self.resolution if size is None else size, window)
-        return self._carrying(camera) if origin is target is up is None else camera
+        motion = self.motion if origin is target is up is None else None
+        course = self.course if origin is target is up is None else None
+        return self._carrying(camera, motion, course, rolling_shutter)
 
     @suggests_keywords
     def stereo(self, baseline: float) -> tuple[Self, Self]:
@@ -526,10 +542,9 @@ class Camera(Moving, Answers):
         aside[0, 3] = number("baseline", baseline, lambda x: x > 0, "above 0")
         right = copy(self)
         right.origin = self.origin + self.rotation[:, 0] * aside[0, 3]
-        if self.motion is not None:
-            moved = product(self.motion, aside)
-            assert isinstance(moved, Motion)
-            right.motion = moved
+        for name in ("motion", "course"):
+            if getattr(self, name) is not None:
+                setattr(right, name, product(getattr(self, name), aside))
         return self, right
 
     # --- Time -----------------------------------------------------------------------------------
@@ -570,7 +585,18 @@ class Camera(Moving, Answers):
         """Return the camera at a time, seconds; one that is still returns itself."""
         if self.motion is None:
             return self
-        return self._placed_by(self.motion.at(number("time", time)))
+        camera = self._placed_by(self.motion.at(number("time", time)))
+        camera.course = self.motion
+        return camera
+
+    @property
+    def over_time(self) -> Self:
+        """The camera with the motion of which it is a moment; itself if it is none."""
+        if self.course is None or self.motion is not None:
+            return self
+        camera = copy(self)
+        camera.motion = self.course
+        return camera
 
     def _placed_by(self, matrix: Doubles) -> Self:
         """Return a still camera by its matrix (4, 4) to the world, whose scale has no effect."""
@@ -580,6 +606,7 @@ class Camera(Moving, Answers):
             raise SceneError(f"Camera transform takes the view to {backward.tolist()}; it must not be zero")
         camera = copy(self)
         camera.origin, camera.rotation, camera.motion = matrix[:3, 3], _axes(backward / size, up), None
+        vars(camera).pop("course", None)
         return camera
 
     def resized(self, size: ImageSize) -> Camera:
@@ -589,21 +616,35 @@ class Camera(Moving, Answers):
         """
         width, height = image_size(size)
         if self.size == self.resolution:
-            return self._carrying(Camera(self.origin, self.rotation, self.projection, (width, height)))
+            whole = Camera(self.origin, self.rotation, self.projection, (width, height))
+            return self._carrying(whole, self.motion, self.course)
         x0, y0, x1, y1 = self.window
         scale = height / (y1 - y0)
         columns, left = _rescaled(self.resolution[0], (x0 + x1) / 2, scale, width)
         rows, top = _rescaled(self.resolution[1], (y0 + y1) / 2, scale, height)
         crop = left, top, left + width, top + height
-        return self._carrying(Camera(self.origin, self.rotation, self.projection, (columns, rows), crop))
+        part = Camera(self.origin, self.rotation, self.projection, (columns, rows), crop)
+        return self._carrying(part, self.motion, self.course)
 
     def cropped(self, crop: Window) -> Camera:
         """Return the same camera that renders only the window (x0, y0, x1, y1) of the whole picture."""
-        return self._carrying(Camera(self.origin, self.rotation, self.projection, self.resolution, crop))
+        part = Camera(self.origin, self.rotation, self.projection, self.resolution, crop)
+        return self._carrying(part, self.motion, self.course)
 
-    def _carrying(self, camera: Camera) -> Camera:
-        """Return another camera at the same place, which is given the motion of this one."""
-        camera.motion = self.motion
+    def _carrying(
+        self,
+        camera: Camera,
+        motion: Motion | None,
+        course: Motion | None,
+        rolling_shutter: float | None = None,
+    ) -> Camera:
+        """Return another camera, which is given a motion, and this one's rolling shutter or another one."""
+        camera.motion = motion
+        if course is not None:
+            camera.course = course
+        rolling = self.rolling_shutter if rolling_shutter is None else rolling_shutter
+        if rolling:
+            camera.rolling_shutter = number("Camera rolling_shutter", rolling)
         return camera
 
     def scaled(self, factor: float) -> Camera:
@@ -721,7 +762,14 @@ class Camera(Moving, Answers):
 
     def metadata(self) -> Mapping[str, Any]:
         """Return what the metadata of the picture say of the camera beside its size."""
-        return {}
+        return {"rolling_shutter": self.rolling_shutter} if self.rolling_shutter else {}
+
+    def row_delay(self, pixel: Words) -> Doubles:
+        """Return how much later than the first row those of pixels (n,) of the whole picture are read, s."""
+        width, height = self.resolution
+        row = (pixel // np.uint32(width)).astype(np.float64)
+        read = self.rolling_shutter
+        return np.asarray((row if read > 0 else row - (height - 1)) * (read / height))
 
     @property
     def uses_lens(self) -> bool:
@@ -858,6 +906,16 @@ class Camera(Moving, Answers):
         away = finite_array("points", points, (None, 3)) - self.origin
         pixels, depth = self.projection.project((away @ self.rotation).T, self.resolution)
         return np.ascontiguousarray(pixels.T) - to_film, depth
+
+    def project_at(self, points: Doubles, times: Doubles) -> tuple[Doubles, Doubles]:
+        """Return what `project` does of points (n, 3), for the camera as it is at times (n,), seconds."""
+        if self.motion is None:
+            return self.project(points)
+        poses = upright(self.motion.at_times(times))
+        away = points - poses[:, :3, 3]
+        local = (away[:, None] @ poses[:, :3, :3])[:, 0]
+        pixels, depth = self.projection.project(local.T, self.resolution)
+        return np.ascontiguousarray(pixels.T), depth
 
     def _turned(self, v: Floats) -> Floats:
         """Transform vectors (3, n) of camera space to world space."""

@@ -16,17 +16,18 @@ from ..arrays.vec import luminance
 from ..camera import Camera
 from ..codecs.tone import CHOSEN_TONE
 from ..compile.scene import CompiledScene
-from ..core.errors import collect_warnings, warn_caller
+from ..core.errors import SceneError, collect_warnings, warn_caller
 from ..core.fingerprint import fingerprint
 from ..core.progress import phase
 from ..features.compiling import compile_scene
 from ..integrators import INTEGRATORS, WITH_MIS
 from ..lights import DirectionalLight, Environment, Sky
 from ..media import Medium
+from ..motion.shutter import Shutter
 from ..scene import Scene
 from ..scene.lighting import DEFAULT, choose_ground, choose_preset, is_above, lighted
 from ..settings import AUTO, Settings
-from ..settings.checks import MEDIA, MOVING, check_combinations
+from ..settings.checks import MEDIA, MOVING, ROLLING, check_combinations
 
 
 class PreparedScene:
@@ -66,6 +67,7 @@ class PreparedScene:
     def __init__(self, scene: Scene, settings: Settings, camera: Camera, framed: Camera | None) -> None:
         self.scene, self._camera, self._geometries = scene, camera, list[Geometry]()
         self._framed = framed is not None
+        self._span = _exposed_for(scene, settings, camera)
         self._fingerprint: str | None = None
         self._light(settings, camera, framed)
         if settings.values["integrator"] == "naive":
@@ -74,7 +76,10 @@ class PreparedScene:
         with phase("building the scene", settings.values["progress"]):
             compiled = self._compile(settings)
         scatters = compiled.media is not None and not compiled.media.only_absorbs
-        check_combinations({**settings.values, MEDIA: scatters, MOVING: compiled.motion is not None})
+        rolls = self._span is not None and camera.rolling_shutter != 0
+        check_combinations(
+            {**settings.values, MEDIA: scatters, MOVING: compiled.motion is not None, ROLLING: rolls}
+        )
         self.compiled = replace(compiled, roulette_after=settings.roulette_after)
         self.shapes = ShapeTable(self.lighted.shapes)
 
@@ -119,9 +124,24 @@ class PreparedScene:
             asked={
                 "background": settings.background_color,
                 "features": values["features"],
-                "shutter": settings.shutter,
+                "shutter": self._span,
             },
         )
+
+    def check_camera(self, camera: Camera) -> None:
+        """Check that another camera can see the compiled scene.
+
+        Raises
+        ------
+        SceneError
+            If it is too far away, or its sensor is read more slowly than that of the first camera.
+        """
+        self.compiled.view(camera)
+        if self._span is not None and abs(camera.rolling_shutter) > abs(self._camera.rolling_shutter):
+            raise SceneError(
+                f"Camera rolling_shutter is {camera.rolling_shutter:g}; this scene was compiled for at most "
+                f"{abs(self._camera.rolling_shutter):g} s, those of the first camera"
+            )
 
     @cached_property
     def subject_part(self) -> float:
@@ -141,6 +161,24 @@ class PreparedScene:
         if self._fingerprint is None:
             self._fingerprint = scene_fingerprint(self.compiled, self._geometries)
         return self._fingerprint
+
+
+def _exposed_for(scene: Scene, settings: Settings, camera: Camera) -> Shutter | None:
+    """Return the shutter, open for as long as any row of a camera is exposed.
+
+    Raises
+    ------
+    SceneError
+        If the camera has a rolling shutter, something moves, and no shutter is given.
+    """
+    if settings.shutter is not None:
+        return settings.shutter.read_over(camera.rolling_shutter)
+    if camera.rolling_shutter and (camera.moves or scene.moves):
+        raise SceneError(
+            f"Camera rolling_shutter is {camera.rolling_shutter:g}, and something moves; "
+            "shutter=(open, close) says when its first row is exposed"
+        )
+    return None
 
 
 def scene_fingerprint(compiled: CompiledScene, geometries: Sequence[Geometry]) -> str:

@@ -314,7 +314,7 @@ class Session:
         camera, _ = choose_camera(
             self._scene.scene, camera, size, values["up"], values["view"], values["fov"]
         )
-        self._scene.compiled.view(camera)  # checks its distance
+        self._scene.check_camera(camera)
         executor = settings.executor_for(camera.size)
         budget = make_budget(settings, camera.size, executor, self._plan.tracer.recorded_aovs)
         sums = self._plan.sums(camera.size)
@@ -326,7 +326,7 @@ class Session:
             other_workers = (executor, self._plan.executor) == ("processes", "threads")
             other_workers |= budget.workers != self._plan.budget.workers
             other_workers |= fits_a_wave(settings, camera.size, budget) != self._plan.inline
-            other_workers |= camera.moves != self._picture.camera.moves
+            other_workers |= camera.moves or self._picture.camera.moves  # their motions are part of the plan
             table = learn_guide(settings, self._scene.compiled, camera)
             other_workers |= table is not self._plan.tracer.table
             if self._monitor.stop.value or other_workers:

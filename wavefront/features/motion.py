@@ -10,6 +10,7 @@ from ..arrays.soa import soa
 from ..arrays.state import Hits, Paths, Rays, SurfaceInteraction, Words
 from ..arrays.vec import Doubles, Floats, Ints, f4, normalize
 from ..camera import Camera
+from ..camera.poses import upright
 from ..compile.program import Facts, Feature
 from ..compile.scene import CompiledScene
 from ..motion.shutter import Shutter
@@ -215,7 +216,8 @@ class Exposure(Feature):
 
     def times(self, camera: Camera, pixel: Words, u: Floats) -> Doubles:
         """Return the times (n,) of paths of pixels (n,) of the whole picture, s, for u (n,) in [0, 1)."""
-        return self.shutter.times(u)
+        times = self.shutter.times(u)
+        return times + camera.row_delay(pixel) if camera.rolling_shutter else times
 
     def to_camera(self, time: Doubles, point: Floats) -> Floats:
         """Return where points (3, n) are at times (n,) for a camera that stands still."""
@@ -249,14 +251,3 @@ def motions_of_camera(camera: Camera, shutter: Shutter, center: Doubles, factor:
         return moved
 
     return Motions.of([matrices], shutter.begin, shutter.end, np.ones(1))
-
-
-def upright(matrices: Doubles) -> Doubles:
-    """Return matrices (n, 4, 4) of cameras without their scales, as `Camera.at` has them."""
-    found = matrices.copy()
-    backward, up = found[:, :3, 2], found[:, :3, 1]
-    backward = backward / np.linalg.norm(backward, axis=1, keepdims=True)
-    right = np.cross(up, backward)
-    right /= np.linalg.norm(right, axis=1, keepdims=True)
-    found[:, :3, 0], found[:, :3, 1], found[:, :3, 2] = right, np.cross(backward, right), backward
-    return found

@@ -18,7 +18,10 @@ def seen_by(scene: CompiledScene, camera: Camera, shutter: Shutter | None) -> Co
     scene = scene.seen_by(camera)
     if shutter is None or not (scene.motion is not None or camera.moves):
         return scene
-    motions = motions_of_camera(camera, shutter, scene.center, scene.scale) if camera.moves else None
+    motions = None
+    if camera.moves:
+        span = shutter.read_over(camera.rolling_shutter)
+        motions = motions_of_camera(camera, span, scene.center, scene.scale)
     return replace(scene, program=scene.program.plus(Exposure(shutter, motions)))
 
 

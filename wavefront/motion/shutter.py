@@ -56,6 +56,10 @@ class Shutter:
     end: float  # when it is closed
     curve: Curve = box
 
+    def read_over(self, seconds: float) -> Shutter:
+        """Return a shutter that is open while any row is exposed, of a sensor read over some seconds."""
+        return Shutter(self.begin, self.end + abs(seconds), self.curve)
+
     @property
     def middle(self) -> float:
         """The middle of the time for which it is open."""

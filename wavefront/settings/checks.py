@@ -197,6 +197,7 @@ ANY_PIXEL = "paths from lights reach any pixel"
 ONLY_FULL = "only the paths of integrator='full' go on from surface to surface with light samples"
 MEDIA = "media that scatter"  # or emit, or vary: known of a scene once it is compiled
 MOVING = "shapes or lights that move while the shutter is open"  # likewise
+ROLLING = "a camera with a rolling shutter"  # likewise
 GIVEN = "samples are given by their numbers"
 EXCLUSIONS = (
     Exclusion("reuse", "clamp", f"a clamp limits what one path finds, and {ONE_PATH}"),
@@ -213,6 +214,7 @@ EXCLUSIONS = (
     Exclusion("reuse", MEDIA, "points within media are not shared"),
     Exclusion("caustics", MEDIA, "paths from lights do not follow them"),
     Exclusion("reuse", MOVING, "each path meets the scene at a time of its own"),
+    Exclusion("caustics", ROLLING, "a path from a light has a time before it is known which row it reaches"),
     Exclusion("view", "camera", "a view is framed by a camera of its own"),
     Exclusion("fov", "camera", "a camera has a field of view of its own"),
     Exclusion("scalars", "material", "both say what the surface looks like"),
@@ -230,6 +232,7 @@ ASKED: dict[str, Callable[[Mapping[str, Any]], bool]] = {
     "features": lambda values: bool(values["features"]),
     MEDIA: lambda values: bool(values.get(MEDIA)),
     MOVING: lambda values: bool(values.get(MOVING)),
+    ROLLING: lambda values: bool(values.get(ROLLING)),
     "filter": lambda values: FILTERS.find(values["filter"]) is not box,
     "light groups": lambda values: "light_groups" in values["aovs"],
     "another integrator": lambda values: INTEGRATORS.find(values["integrator"]) is not li_full,
@@ -275,7 +278,7 @@ def _both_ways() -> Iterator[Exclusion]:
 
 
 def _in_words(values: Mapping[str, Any], name: str) -> str:
-    if name in (MEDIA, MOVING):
+    if name in (MEDIA, MOVING, ROLLING):
         return name
     setting = SETTING_OF.get(name, name)
     return f"{setting}={in_brief(SHOWN.get(setting, lambda value: value)(values[setting]))}"
