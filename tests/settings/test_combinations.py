@@ -61,6 +61,7 @@ VALUES: dict[str, Any] = {  # of each setting, one that is not its default
     "checkpoint_interval": 10.0,
     "max_memory": "8GB",
     "strict": True,
+    "flow_times": (0.0, 1.0),
     "aovs": "depth",
     "light groups": "light_groups",
     "denoise": True,

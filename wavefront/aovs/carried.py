@@ -43,7 +43,7 @@ def _moved(shape: Any, face: Ints, point: Doubles, start: Doubles, end: Doubles)
     """Return where points (n, 3) of one shape are."""
     form = shape.mesh if isinstance(shape, Instance) else shape
     before, after = (_matrices(shape, times) for times in (start, end))
-    own = _applied(np.linalg.inv(before), point)
+    own = _applied(np.asarray(np.linalg.inv(before), np.float64), point)
     if form.deformation is not None:
         own = _reformed(form, face, own, start, end)
     return _applied(after, own)
@@ -84,21 +84,22 @@ def _on_mesh(mesh: Mesh, before: Any, after: Any, face: Ints, point: Doubles) ->
 
 
 def _on_primitives(before: Any, after: Any, number: Ints, point: Doubles) -> Doubles:
-    """Return where points (n, 3) of spheres, or of what is about segments, are: these turn the shorter way."""
+    """Return where points (n, 3) of spheres are, or of what is about segments, which turn the shorter way."""
     if "centers" in before:
-        return point + (after["centers"] - before["centers"]).take(number, 0)
+        return np.asarray(point + (after["centers"] - before["centers"]).take(number, 0), np.float64)
     (a, b), (c, d) = ([form[name].take(number, 0) for name in ("starts", "ends")] for form in (before, after))
     old, new = b - a, d - c
     length = _dots(old, old)[:, None]
     part = _dots(point - a, old)[:, None] / np.where(length > 0, length, 1)
-    return c + part * new + _turned(point - a - part * old, _unit(old), _unit(new))
+    return np.asarray(c + part * new, np.float64) + _turned(point - a - part * old, _unit(old), _unit(new))
 
 
 def _turned(v: Doubles, one: Doubles, other: Doubles) -> Doubles:
     """Return vectors (n, 3), turned as unit vectors (n, 3) turn to others the shorter way."""
-    axis, cos = np.cross(one, other), _dots(one, other)[:, None]
+    axis: Doubles = np.cross(one, other)
+    cos = _dots(one, other)[:, None]
     along = _dots(axis, v)[:, None] / np.maximum(1 + cos, 1e-12)
-    return np.asarray(v * cos + np.cross(axis, v) + axis * along)
+    return np.asarray(v * cos + np.cross(axis, v) + axis * along, np.float64)
 
 
 def _unit(v: Doubles) -> Doubles:
@@ -107,7 +108,7 @@ def _unit(v: Doubles) -> Doubles:
 
 
 def _dots(a: Doubles, b: Doubles) -> Doubles:
-    return dot(np.ascontiguousarray(a.T), np.ascontiguousarray(b.T))
+    return np.asarray(dot(np.ascontiguousarray(a.T), np.ascontiguousarray(b.T)), np.float64)
 
 
 def weights_on(

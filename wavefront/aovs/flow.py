@@ -1,4 +1,4 @@
-"""Optical flow: where what each pixel shows is in the pictures of other times, and whether it is seen there."""
+"""Optical flow: where the pictures of other times show what each pixel shows, and whether they do."""
 
 from __future__ import annotations
 
@@ -51,7 +51,7 @@ class Flow:
             (n,) and (n, 3) what they show.
         """
         width = self.camera.resolution[0]
-        film = np.stack([pixel % width, pixel // width], 1) + 0.5
+        film: Doubles = np.stack([pixel % width, pixel // width], 1) + np.float64(0.5)
         for name, which in FLOWS.items():
             hidden = next(each for each, of in HIDDEN.items() if of == name)
             if name not in names and hidden not in names:
@@ -90,7 +90,7 @@ class Flow:
         return flow
 
     def _hidden(self, time: float, times: Doubles, places: Doubles, there: Doubles) -> NDArray[np.int32]:
-        """Return 1 for points (n, 3) that the picture of a time does not show, because of what is nearer or its edge.
+        """Return 1 for points (n, 3) that the picture of a time does not show: hidden, or beside it; else 0.
 
         Parameters
         ----------
@@ -102,18 +102,20 @@ class Flow:
         x0, y0, x1, y1 = self.camera.window
         inside = (there >= (x0, y0)).all(1) & (there < (x1, y1)).all(1)
         lanes = np.flatnonzero(inside)
-        hidden = (~inside).astype(np.int32)
+        hidden: NDArray[np.int32] = np.where(inside, 0, 1).astype(np.int32)
         if lanes.size:
             hidden[lanes] = self._covered(time, times[lanes], places[lanes], there[lanes])
         return hidden
 
     def _covered(self, time: float, times: Doubles, places: Doubles, there: Doubles) -> Bools:
-        """Return whether something is nearer to the camera than points (n, 3), on rays through film points."""
+        """Return whether something is nearer to the camera than points (n, 3), on their way to it."""
         scene = self.scene_at(time)
         rays = self._rays(scene, times, there)
         moved, hits = covering_hits(scene, rays)
         origin, direction = (each.astype(np.float64) for each in (rays.origin, rays.direction))
-        met = dot(moved.origin.astype(np.float64) + moved.direction.astype(np.float64) * hits.t - origin, direction)
+        met = dot(
+            moved.origin.astype(np.float64) + moved.direction.astype(np.float64) * hits.t - origin, direction
+        )
         far = dot((places * scene.scale - scene.center).T - origin, direction)
         return np.asarray((hits.prim != -1) & (met < far * (1 - NEARER)))
 
@@ -123,13 +125,13 @@ class Flow:
         order = np.argsort(times, kind="stable")
         for lanes in np.split(order, np.flatnonzero(np.diff(times[order])) + 1):
             view = scene.view(self.camera.at(float(times[lanes[0]])))
-            start, along = view.rays(*there[lanes].T.astype(f4), scene.center)
+            x, y = there[lanes].T.astype(f4)
+            start, along = view.rays(x, y, scene.center)
             origin.append(start)
             direction.append(along)
         back = np.argsort(order, kind="stable")
-        rays = Rays(
-            *(np.concatenate(each, 1)[:, back] for each in (origin, direction)), np.full(n, -1, np.intp)
-        )
+        starts, ways = (np.concatenate(each, 1)[:, back] for each in (origin, direction))
+        rays = Rays(starts, ways, np.full(n, -1, np.intp))
         if scene.motion is not None:
             rays.time = times
         return rays

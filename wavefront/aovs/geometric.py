@@ -13,17 +13,18 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..arrays.state import Hits, Rays, Words
-from ..arrays.vec import Bools, Doubles, Ints, distinct, dot, f4, length
+from ..arrays.vec import Doubles, Ints, distinct, dot, f4, length
 from ..camera import Camera
 from ..compile.materials import material_parts
 from ..compile.scene import CompiledScene
-from ..film.aov_names import AOVS
+from ..film.aov_names import MASKS, aov_of
 from ..materials import Material
 from ..shapes import Instance, Mesh, Shape
 from ..stages.generate import center_rays
 from ..stages.interaction import interaction
 from ..stages.passing import covering_hits
-from .carried import weights_on
+from .carried import carried, weights_on
+from .flow import Flow
 
 RAYS_AT_ONCE = 1 << 16
 IDS = {"shape_id": "shape", "instance_id": "instance", "material_id": "material"}
@@ -81,7 +82,11 @@ class ShapeTable:
 
 
 def geometric_aovs(
-    scene: CompiledScene, camera: Camera, shapes: ShapeTable, names: Sequence[str]
+    scene: CompiledScene,
+    camera: Camera,
+    shapes: ShapeTable,
+    names: Sequence[str],
+    flow: Flow | None = None,
 ) -> dict[str, NDArray[Any]]:
     """Return geometric AOVs of a picture by name, (height, width) or (height, width, channels).
 
@@ -95,6 +100,8 @@ def geometric_aovs(
         Those of the scene.
     names
         The AOVs that are asked for.
+    flow
+        How surfaces go on to other times, if AOVs of flow are asked for.
     """
     width, height = camera.size
     layers = {name: _empty(name, width * height) for name in names}
@@ -110,6 +117,11 @@ def geometric_aovs(
         rays = center.take(met), moved.take(met)
         for name, values in _found(scene, camera, shapes, corners, names, *rays, hits):
             layers[name][span][met] = values
+        if flow is not None:
+            shape, face = scene.shape_numbers.of(hits), scene.shape_numbers.face(hits)
+            seen = view.address(pixel[met]).astype(np.int64)
+            for name, values in flow.layers(names, seen, shape, face, _points(scene, *rays, hits)[0]):
+                layers[name][span][met] = values
     return {
         name: values.reshape((height, width) if values.ndim == 1 else (height, width, -1))
         for name, values in layers.items()
@@ -118,9 +130,9 @@ def geometric_aovs(
 
 def _empty(name: str, pixels: int) -> NDArray[Any]:
     """Return an AOV without any hit."""
-    if name in IDS:
+    if name in (*IDS, *MASKS):
         return np.full(pixels, -1, np.int32)
-    channels = AOVS[name].channels
+    channels = aov_of(name).channels
     return np.full(pixels if channels == 1 else (pixels, channels), np.nan, f4)
 
 
@@ -155,13 +167,7 @@ def _found(
         time = center.time
         yield "depth", camera.project(point)[1] if time is None else camera.project_at(point, time)[1]
     if corners is not None:
-        uv = corners.uv(shape, scene.shape_numbers.face(hits), point)
-        curved = np.flatnonzero(hits.prim >= scene.triangles)
-        if curved.size:
-            met = moved.take(curved)
-            on = met.origin + met.direction * hits.t.take(curved)
-            uv[curved] = scene.curved.uv(hits.prim.take(curved) - scene.triangles, on).T
-        yield "uv", uv
+        yield "uv", _uv(scene, corners, shape, point, moved, hits)
     if any(name in names for name in NORMALS):
         surface = interaction(scene, moved, hits)
         for tilt in scene.program.tilt:
@@ -170,6 +176,30 @@ def _found(
             yield "normal", surface.ns.T
         if "normal_geometric" in names:
             yield "normal_geometric", surface.ng.T
+
+
+def _uv(
+    scene: CompiledScene, corners: _Corners, shape: Ints, point: Doubles, rays: Rays, hits: Hits
+) -> Doubles:
+    """Return texture coordinates (n, 2) of points (n, 3), NaN where there are none.
+
+    Of rays with times, points are carried to where shapes are at their start, and curved ones in the tables.
+    """
+    face, shapes, first = scene.shape_numbers.face(hits), corners.shapes, point
+    if rays.time is not None:
+        start = min((each.time_span[0] for each in shapes if each.moves), default=0.0)
+        first = carried(shapes, shape, face, point, rays.time, np.full(len(point), start))
+    uv = corners.uv(shape, face, first)
+    curved = np.flatnonzero(hits.prim >= scene.triangles)
+    if curved.size:
+        met = rays.take(curved)
+        on = met.origin + met.direction * hits.t.take(curved)
+        if met.time is not None and scene.motion is not None:
+            then = np.full(curved.size, scene.motion.shutter.middle)
+            places = carried(shapes, shape[curved], face[curved], point[curved], met.time, then)
+            on = (places * scene.scale - scene.center).T.astype(f4)
+        uv[curved] = scene.curved.uv(hits.prim.take(curved) - scene.triangles, on).T
+    return uv
 
 
 def _points(scene: CompiledScene, center: Rays, moved: Rays, hits: Hits) -> tuple[Doubles, Doubles]:
@@ -190,7 +220,7 @@ class _Corners:
     """The triangles of the user's shapes, for values at points on them."""
 
     def __init__(self, shapes: Sequence[Shape]) -> None:
-        self._shapes = shapes
+        self.shapes = shapes
         meshes = [shape.mesh if isinstance(shape, Instance) else shape for shape in shapes]
         numbers: dict[int, int] = {}
         self._of_shape = np.array([numbers.setdefault(id(mesh), len(numbers)) for mesh in meshes], np.intp)
@@ -214,11 +244,11 @@ class _Corners:
 
     def _placed(self, number: Ints, vertex: Doubles) -> Doubles:
         """Return vertices (3, n) of the meshes of shapes (n,) in the scene."""
-        if not isinstance(self._shapes[number[0]], Instance):
+        if not isinstance(self.shapes[number[0]], Instance):
             return vertex
         used = distinct(number)
         lane = np.searchsorted(used, number)
-        placed = [self._shapes[each] for each in used]
+        placed = [self.shapes[each] for each in used]
         m = np.stack([shape.transform for shape in placed if isinstance(shape, Instance)])
         m = m.take(lane, 0).transpose(1, 2, 0)
         x, y, z = vertex

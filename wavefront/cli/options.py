@@ -93,6 +93,12 @@ def shutter(text: str) -> tuple[float, float]:
     return begin, end
 
 
+def flow_times(text: str) -> tuple[float, float]:
+    """Return BEFORE:AFTER as two times."""
+    before, after = _parts(text, ":", float, 2, f"{text!r} is not BEFORE:AFTER, such as 0.46:0.54")
+    return before, after
+
+
 def fov(text: str) -> float:
     """Return an angle between 0 and 180 degrees."""
     fov = _finite(text)
@@ -225,6 +231,7 @@ READERS: dict[str, tuple[Callable[[str], Any], str | None]] = {
     "roulette": (roulette_after, "EVENTS"),
     "samples": (samples, "FIRST:END"),
     "shutter": (shutter, "OPEN:CLOSE"),
+    "flow_times": (flow_times, "BEFORE:AFTER"),
     "branches": (branches, None),
     "reuse": (reuse, None),
 }

@@ -27,15 +27,17 @@ EVEN = 1e-5  # relative difference of scales along two axes that does not matter
 def exposed_scene(scene: Scene, shutter: Shutter | None) -> Exposed:
     """Return a scene in the middle of the time for which a shutter is open, and what of it moves.
 
-    Without a shutter, or where nothing moves, it is the scene itself.
+    Without a shutter it is the scene itself.
 
     Raises
     ------
     SceneError
         If something moves in a way that cannot be shown.
     """
-    if shutter is None or not any(_moves(each, shutter) for each in (*scene.shapes, *scene.lights)):
+    if shutter is None:
         return Exposed(scene)
+    if not any(_moves(each, shutter) for each in (*scene.shapes, *scene.lights)):
+        return Exposed(scene.at(shutter.middle))
     still, moving = copy(scene), [shape for shape in scene.shapes if _moves(shape, shutter)]
     times = np.linspace(shutter.begin, shutter.end, TIMES).tolist()
     boxes = [Scene([shape.at(time) for shape in moving]).bounds for time in times if moving]

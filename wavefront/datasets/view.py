@@ -73,6 +73,7 @@ def camera_matrices(camera: Camera, farthest: float) -> dict[str, Any]:
     k[:2, 2] -= camera.window[:2]
     return {
         "size": list(camera.size),
+        **({"rolling_shutter": camera.rolling_shutter} if camera.rolling_shutter else {}),
         "opencv": {
             "K": k.tolist(),
             "world_to_camera": camera.extrinsics().tolist(),

@@ -18,6 +18,7 @@ from ..camera import Camera
 from ..core.errors import SceneError, finite_array, number
 from ..core.files import path_name
 from ..core.progress import Bar
+from ..film.aov_names import chosen_aovs, flow_names
 from ..image import Image
 from ..io.to_scene import COLORING, as_scene, coloring_of
 from ..scene import Scene
@@ -93,7 +94,8 @@ def render_frames(
     given: dict[str, Any] = {**settings}
     scene_at, span = _source(source, animation, given)
     moments = frame_times(times, fps, span)
-    jobs = [(each, _settings_of_frame(given, at, each)) for at, each in enumerate(moments.tolist())]
+    own = _with_flow_times(given, moments)
+    jobs = [(each, _settings_of_frame(own[at], at, each)) for at, each in enumerate(moments.tolist())]
     Settings(spp=spp, **jobs[0][1])  # checks them
     frames = _by_jobs if _takes_frames(given.get("executor")) else _one_by_one
     begin = clock.perf_counter()
@@ -165,6 +167,22 @@ def _settings_of_frame(given: dict[str, Any], at: int, time: float) -> dict[str,
     return own
 
 
+def _with_flow_times(given: dict[str, Any], moments: Doubles) -> list[dict[str, Any]]:
+    """Return the settings of frames, those of optical flow with the times of the frames before and after.
+
+    Before the first frame and after the last one, the time goes on as between it and the next one.
+    """
+    if given.get("flow_times") is not None or not flow_names(chosen_aovs("aovs", given.get("aovs", ()))):
+        return [given] * len(moments)
+    if len(moments) < 2:
+        raise SceneError("flow of one frame needs flow_times=(before, after), the times of other frames")
+    ends = 2 * moments[0] - moments[1], 2 * moments[-1] - moments[-2]
+    around = np.concatenate([ends[:1], moments, ends[1:]])
+    return [
+        {**given, "flow_times": pair} for pair in zip(around[:-2].tolist(), around[2:].tolist(), strict=True)
+    ]
+
+
 def _takes_frames(executor: Any) -> bool:
     """Return whether an executor is given frames, not waves: those of the user's own."""
     return executor is not None and not isinstance(executor, str)
@@ -215,7 +233,8 @@ def _goes_on(
     lists = (before.shapes, scene.shapes), (before.lights, scene.lights)
     same = all(len(a) == len(b) and all(map(is_, a, b)) for a, b in lists)
     same &= before.medium is scene.medium and before.settings == scene.settings
-    return same and settings.get("checkpoint") is None and session.suits(camera)
+    same &= settings.get("checkpoint") is None and settings.get("flow_times") is None
+    return same and session.suits(camera)
 
 
 # --- Frames as jobs of an executor ----------------------------------------------------------------------

@@ -23,7 +23,15 @@ from ..colors import EFFICACY
 from ..compile.brightest import brightest_emitter
 from ..core.errors import RenderError, SaveError, SceneError, warn_caller
 from ..core.fingerprint import fingerprint
-from ..film.aov_names import BEFORE_DENOISING, BOXES, BRIGHTEST, BRIGHTEST_LUX, NARROW, geometric_names
+from ..film.aov_names import (
+    BEFORE_DENOISING,
+    BOXES,
+    BRIGHTEST,
+    BRIGHTEST_LUX,
+    NARROW,
+    flow_names,
+    geometric_names,
+)
 from ..film.checkpoint import Checkpoint, check_identity, contents_of, other_versions, read_checkpoint
 from ..film.film import Film
 from ..film.identity import CODE, SCENE
@@ -254,7 +262,7 @@ class Picture:
             If a monitor ends that.
         """
         if self._geometric is None:
-            compiled, aovs = self.plan.scene.compiled, self.plan.settings.values["aovs"]
+            compiled, aovs = self.plan.tracer.scene, self.plan.settings.values["aovs"]
             if monitor is not None:
                 stoppable = MonitoredAccelerator(compiled.accelerator, monitor, math.inf)
                 compiled = replace(compiled, accelerator=stoppable)
@@ -262,7 +270,8 @@ class Picture:
             if BOXES in aovs:
                 self._boxes = object_boxes(*given)
             names = geometric_names(aovs)
-            self._geometric = geometric_aovs(*given, names) if names else {}
+            flow = self.plan.scene.flow(self.camera, self.plan.settings) if flow_names(aovs) else None
+            self._geometric = geometric_aovs(*given, names, flow) if names else {}
         return self._geometric
 
     def _add_aovs(self, image: Image, geometric: dict[str, NDArray[Any]]) -> None:

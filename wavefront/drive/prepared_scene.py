@@ -5,12 +5,13 @@ from __future__ import annotations
 from collections.abc import Sequence
 from copy import copy
 from dataclasses import fields, replace
-from functools import cached_property
+from functools import cached_property, partial
 from typing import Any
 
 import numpy as np
 
-from ..accel import Accelerator, Geometry, InstanceAccelerator, most_copies
+from ..accel import Accelerator, AcceleratorCache, Geometry, InstanceAccelerator, most_copies
+from ..aovs.flow import Flow
 from ..aovs.geometric import ShapeTable, geometric_aovs
 from ..arrays.vec import luminance
 from ..camera import Camera
@@ -142,6 +143,34 @@ class PreparedScene:
                 f"Camera rolling_shutter is {camera.rolling_shutter:g}; this scene was compiled for at most "
                 f"{abs(self._camera.rolling_shutter):g} s, those of the first camera"
             )
+
+    def flow(self, camera: Camera, settings: Settings) -> Flow:
+        """Return how what a camera sees goes on to the pictures before and after.
+
+        Raises
+        ------
+        SceneError
+            If a shape is left out of this moment, as it has no size then.
+        """
+        whole, count = self.scene.whole, len(self.scene.shapes)
+        if len(whole.shapes) != count:
+            raise SceneError(
+                f"at {self.scene.moment:g} s a shape has no size; flow needs a scene with all its shapes"
+            )
+        own, times = settings.shutter, settings.values["flow_times"]
+        assert times is not None
+        start = whole.start if self.scene.moment is None else self.scene.moment
+        shapes = [*whole.shapes, *self.lighted.shapes[count:]]
+        at = partial(self._surfaces_at, whole, camera.rolling_shutter, settings.values["accel"])
+        return Flow(shapes, camera.over_time, start if own is None else own.middle, times, at)
+
+    def _surfaces_at(self, whole: Scene, read: float, accel: Any, time: float) -> CompiledScene:
+        """Return the surfaces that there are at a time, and while a sensor is read from then on, s."""
+        moment = copy(whole if read else whole.at(time))
+        moment.shapes = [*moment.shapes, *self.lighted.shapes[len(self.scene.shapes) :]]
+        moment.lights = []
+        span = Shutter(time, time + abs(read)) if read else None
+        return compile_scene(moment, AcceleratorCache().maker(accel), asked={"shutter": span})
 
     @cached_property
     def subject_part(self) -> float:

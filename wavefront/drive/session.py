@@ -405,7 +405,7 @@ class Session:
         camera
             The camera; None for that of the picture.
         """
-        return silhouettes(self._scene.compiled, self._picture.camera if camera is None else camera)
+        return silhouettes(self._plan.tracer.scene, self._picture.camera if camera is None else camera)
 
     @property
     def stages(self) -> StageList:

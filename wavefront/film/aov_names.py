@@ -50,6 +50,13 @@ AOVS: dict[str, Aov] = {
     "denoising_normal": _sampled(3, "shading normal there, world"),
 }
 
+FLOW_AOVS: dict[str, Aov] = {  # of scenes that move, to the times of the setting `flow_times`
+    "flow": _geometric(2, "pixels to the right and down to where the next picture shows the same point"),
+    "flow_back": _geometric(2, "the same of the picture before"),
+    "flow_occluded": _geometric(1, "1 where the next picture does not show that point, else 0, int32"),
+    "flow_back_occluded": _geometric(1, "the same of the picture before, int32"),
+}
+MASKS = "flow_occluded", "flow_back_occluded"  # of integers, which are -1 where nothing is hit
 KEYED_AOVS: dict[str, Aov] = {  # one AOV for each key, named "light_groups.KEY" and "coverage.KEY"
     "light_groups": _sampled(3, "radiance by the group of the light that it comes from"),
     "coverage": _sampled(1, "part of the pixel that each shape covers, by the name of the shape"),
@@ -104,9 +111,14 @@ def geometric_names(chosen: Iterable[str]) -> tuple[str, ...]:
     return tuple(name for name in chosen if name != BOXES and not aov_of(name).sampled)
 
 
+def flow_names(chosen: Iterable[str]) -> tuple[str, ...]:
+    """Return the names of the AOVs of optical flow among those that were chosen."""
+    return tuple(name for name in chosen if name in FLOW_AOVS)
+
+
 def aov_of(name: str) -> Aov:
     """Return an AOV by its name, that of an AOV with a key such as "light_groups.sun"."""
-    known = {**AOVS, **KEYED_AOVS, **NOTED_AOVS, **GIVEN_AOVS, **MEASURED_AOVS, **SENSOR_AOVS}
+    known = {**AOVS, **FLOW_AOVS, **KEYED_AOVS, **NOTED_AOVS, **GIVEN_AOVS, **MEASURED_AOVS, **SENSOR_AOVS}
     return known[name.partition(".")[0]]
 
 
@@ -124,14 +136,14 @@ def chosen_aovs(name: str, value: Any) -> tuple[str, ...]:
     name
         What the value is called in errors.
     value
-        A name, or several: of `AOVS`, of `KEYED_AOVS`, "noted.NAME", "boxes" or "all".
+        A name, or several: of `AOVS`, of `FLOW_AOVS`, of `KEYED_AOVS`, "noted.NAME", "boxes" or "all".
 
     Raises
     ------
     SceneError
         If one is unknown. The message lists all of them.
     """
-    known = (*AOVS, *KEYED_AOVS, BOXES)
+    known = (*AOVS, *FLOW_AOVS, *KEYED_AOVS, BOXES)
     chosen = [value] if isinstance(value, str) else list(value) if isinstance(value, Iterable) else None
     if chosen is None:
         raise SceneError(f"{name} is {value!r}; it must be the name of an AOV, or several names")
@@ -139,7 +151,7 @@ def chosen_aovs(name: str, value: Any) -> tuple[str, ...]:
         if not isinstance(each, str) or (each not in (*known, ALL_AOVS) and not is_noted(each)):
             raise SceneError(
                 f"{name} has {each!r}; there are {', '.join(known)}, and {ALL_AOVS!r} for all but "
-                f"{', '.join((*KEYED_AOVS, BOXES))}{did_you_mean(each, known)}"
+                f"{', '.join((*FLOW_AOVS, *KEYED_AOVS, BOXES))}{did_you_mean(each, known)}"
             )
     wanted = {*chosen, *(AOVS if ALL_AOVS in chosen else ())}
     noted = (each for each in dict.fromkeys(chosen) if is_noted(each))
@@ -159,7 +171,7 @@ def is_radiance(name: str) -> bool:
 
 
 _AXES = dict.fromkeys(("position", "normal", "normal_geometric", "denoising_normal"), "XYZ")
-_KNOWN = {**_AXES, "uv": "UV", "depth": "Z", "distance": "Z", "alpha": "A"}
+_KNOWN = {**_AXES, "uv": "UV", "flow": "XY", "flow_back": "XY", "depth": "Z", "distance": "Z", "alpha": "A"}
 _BY_COUNT = {1: "X", 2: "XY", 3: "RGB"}
 
 

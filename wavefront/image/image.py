@@ -30,6 +30,7 @@ from ..film.aov_names import (
     BEFORE_DENOISING,
     BOXES,
     CLAMPED,
+    FLOW_AOVS,
     GIVEN_AOVS,
     NOISY,
     STANDARD_ERROR,
@@ -208,12 +209,14 @@ class Image(Answers):
 
     def __getattr__(self, name: str) -> NDArray[Any]:
         """Return a layer by its name."""
-        if name in AOVS or name in GIVEN_AOVS:
+        if name in AOVS or name in FLOW_AOVS or name in GIVEN_AOVS:
             if name in self.__dict__.get("layers", ()):
                 return self.layers[name]
             setting = "clamp=" if name == CLAMPED else f"aovs=({name!r},)"
             raise AttributeError(f"the image has no layer {name!r}; render it with {setting}")
-        known = () if name.startswith("_") else (*AOVS, *GIVEN_AOVS, *vars(self), *dir(type(self)))
+        known = (
+            () if name.startswith("_") else (*AOVS, *FLOW_AOVS, *GIVEN_AOVS, *vars(self), *dir(type(self)))
+        )
         hint = did_you_mean(name, [other for other in known if not other.startswith("_")], ("image",))
         raise AttributeError(f"{type(self).__name__!r} object has no attribute {name!r}{hint}")
 
@@ -882,7 +885,7 @@ class Image(Answers):
         from . import plot
 
         arrays = {**self._data().named(), "luminance": self.luminance}
-        if name in AOVS and name not in arrays:
+        if (name in AOVS or name in FLOW_AOVS) and name not in arrays:
             raise SceneError(f"plot: the image has no layer {name!r}; render it with aovs=({name!r},)")
         values = arrays[one_of("layer", name, arrays)]
         table = self.names.get(name.removesuffix("_id"), {}) if name.endswith("_id") else None

@@ -315,6 +315,11 @@ class Scene(Answers):
         return moment
 
     @property
+    def whole(self) -> Scene:
+        """The scene with all its times, of which this one may be a moment."""
+        return self._source
+
+    @property
     def _source(self) -> Scene:
         """The scene with all times: this one, or the one that it is a moment of."""
         return self if self._whole is None else self._whole

@@ -13,10 +13,11 @@ from ..camera import upward
 from ..codecs.image_data import TRANSPARENT
 from ..colors import rgb
 from ..compile.scene import ROULETTE_AFTER
-from ..core.errors import SceneError, flag, in_brief, number, one_of, warn_caller
+from ..core.errors import SceneError, finite_array, flag, in_brief, number, one_of, warn_caller
 from ..core.files import check_target
 from ..core.progress import Progress
 from ..core.registry import Registry
+from ..film.aov_names import flow_names
 from ..integrators import INTEGRATORS, li_full
 from ..sampling.filters import FILTERS, box
 from ..scene.lighting import SHADOW, check_lighting
@@ -143,6 +144,14 @@ def check_roulette(name: str, value: Any) -> int | bool:
         raise SceneError(f"{error}, or False") from None
 
 
+def check_flow_times(name: str, value: Any) -> tuple[float, float] | None:
+    """Check that something is two times, or None."""
+    if value is None:
+        return None
+    before, after = finite_array(name, value, (2,)).tolist()
+    return before, after
+
+
 def check_view(name: str, value: Any) -> Any:
     """Check the name of a view, or a direction."""
     view_direction(name, value)
@@ -258,6 +267,11 @@ def check_combinations(values: Mapping[str, Any]) -> None:
     SceneError
         If two of them exclude each other. The message has both, and why.
     """
+    flows = flow_names(values["aovs"])
+    if flows and values["flow_times"] is None:
+        raise SceneError(
+            f"aovs has {flows[0]!r}; it needs flow_times=(before, after), times of other pictures, seconds"
+        )
     for each in EXCLUSIONS:
         if each.refused and asked_for(values, each.one) and asked_for(values, each.other):
             pair = " does not go with ".join(_in_words(values, name) for name in (each.one, each.other))

@@ -24,7 +24,7 @@ from ..core.memory import memory_size
 from ..core.progress import Progress
 from ..core.registry import Registry
 from ..core.suggestions import unknown_keyword
-from ..film.aov_names import AOVS, BOXES, KEYED_AOVS, chosen_aovs
+from ..film.aov_names import AOVS, BOXES, FLOW_AOVS, KEYED_AOVS, chosen_aovs
 from ..integrators import INTEGRATORS, Integrator
 from ..lights.choice import LightSamplerMaker
 from ..lights.samplers import LIGHT_SAMPLERS
@@ -43,6 +43,7 @@ from .checks import (
     auto_or,
     check_background,
     check_checkpoint,
+    check_flow_times,
     check_ground,
     check_noise,
     check_preset,
@@ -59,7 +60,7 @@ from .checks import (
 )
 
 MAX_BRANCHES = 64
-AOV_LIST = ", ".join(f'"{name}"' for name in (*AOVS, *KEYED_AOVS, BOXES))
+AOV_LIST = ", ".join(f'"{name}"' for name in (*AOVS, *FLOW_AOVS, *KEYED_AOVS, BOXES))
 P = ParamSpec("P")
 R = TypeVar("R")
 C = TypeVar("C")
@@ -543,10 +544,20 @@ class RenderSettings(TypedDict, total=False):
         Setting(
             (),
             f"AOVs, the layers of the image beside the picture, by name: {AOV_LIST}, "
-            'or "all" for all but the last three. docs/layers.md says what each holds, and what it costs.',
+            'or "all" for all but the last seven. docs/layers.md says what each holds, and what it costs.',
             option="AOV to render beside the picture, or all; can be given several times",
             flag="aov",
             check=chosen_aovs,
+        ),
+    ]
+    flow_times: Annotated[
+        tuple[float, float] | None,
+        Setting(
+            None,
+            "Times of the pictures before and after, (before, after) in seconds of the scene, to which the "
+            'AOVs "flow_back" and "flow" lead. `render_frames` takes those of its frames.',
+            option="BEFORE:AFTER in seconds of the scene: where the AOVs flow_back and flow lead to",
+            check=check_flow_times,
         ),
     ]
     denoise: Annotated[
