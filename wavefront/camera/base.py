@@ -103,8 +103,9 @@ class Camera(Moving, Answers):
         self.resolution = image_size(size)
         projection.check(self.resolution)
         self.window = _window(crop, self.resolution)
-        if rolling_shutter:  # others have the same fingerprint as without this parameter
-            self.rolling_shutter = number("Camera rolling_shutter", rolling_shutter)
+        read = number("Camera rolling_shutter", rolling_shutter)
+        if read:  # others have the same fingerprint as without this parameter
+            self.rolling_shutter = read
 
     def __repr__(self) -> str:
         """Name the projection, where the camera stands and where it looks, and the size."""
@@ -642,9 +643,11 @@ class Camera(Moving, Answers):
         camera.motion = motion
         if course is not None:
             camera.course = course
-        rolling = self.rolling_shutter if rolling_shutter is None else rolling_shutter
-        if rolling:
-            camera.rolling_shutter = number("Camera rolling_shutter", rolling)
+        read = self.rolling_shutter
+        if rolling_shutter is not None:
+            read = number("Camera rolling_shutter", rolling_shutter)
+        if read:
+            camera.rolling_shutter = read
         return camera
 
     def scaled(self, factor: float) -> Camera:
