@@ -11,6 +11,7 @@ from wavefront.motion import Product, Together, product
 from wavefront.motion.keyframes import Trs
 from wavefront.motion.quaternions import polar, quaternions_of, rotation_of, slerp
 from wavefront.motion.track import CUBIC, LINEAR, STEP, Track
+from wavefront.motion.turn import Turn
 
 EPS = np.finfo(np.float64).eps
 CLOSE = 64 * EPS  # some tens of roundings
@@ -119,6 +120,14 @@ def test_a_mirror_stays_a_mirror_between_keys():
     between = motion.at_times(np.linspace(0, 1, 9))[:, :3, :3]
     np.testing.assert_allclose(np.linalg.det(between), -1, atol=CLOSE)
     np.testing.assert_allclose(between[2], turned("y", 30) @ mirror, atol=CLOSE)
+
+
+def test_turns_are_steady_and_go_around_once():
+    turn = Turn(np.array([0.0, 2, 0]), np.array([1.0, 0, 0]), 360, 1, 3)
+    np.testing.assert_allclose(turn.at(3), np.eye(4), atol=CLOSE)
+    due = wf.shapes.transform.rotation("x", "y", 45, (1, 0, 0))
+    np.testing.assert_allclose(turn.at(1.25), due, atol=CLOSE)
+    np.testing.assert_array_equal(turn.at(0), turn.at(1))
 
 
 def test_products_are_exact_between_keys():

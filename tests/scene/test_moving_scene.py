@@ -324,6 +324,7 @@ def test_framing_ground_and_light_are_those_of_all_times():
     np.testing.assert_array_equal(first.to_matrix(), last.to_matrix())
     np.testing.assert_array_equal(first.to_matrix(), scene.framing_camera().to_matrix())
     np.testing.assert_allclose(scene.at(1).reach, [[-1, -1, -1], [5, 1, 1]])
+    assert scene.at(1).reach is scene.at(2).reach  # found once
     np.testing.assert_array_equal(scene.at(1).bounds, [[1, -1, -1], [3, 1, 1]])
     pixels, _ = first.project([(0, 0, 0), (4, 0, 0)])
     assert (pixels > 0).all()

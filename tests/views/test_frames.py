@@ -90,6 +90,14 @@ def test_a_given_camera_moves_too() -> None:
         assert bits(image) == bits(wf.render(moving().at(each), 2, camera=camera.at(each), **QUIET))
 
 
+def test_a_shutter_is_open_around_the_time_of_a_frame() -> None:
+    frames = list(wf.render_frames(moving(), [0.5, 1], 4, fps=2, shutter=0.5, **SMALL))
+    for each, image in zip((0.5, 1), frames, strict=True):
+        due = wf.render(moving(), 4, shutter=(each - 0.125, each + 0.125), **SMALL)
+        assert bits(image) == bits(due)
+        assert bits(image) != bits(wf.render(moving().at(each), 4, **SMALL))
+
+
 @pytest.mark.parametrize(
     ("fps", "due"),
     [(None, 6), (8, 2), (0.1, 1), (12, 3)],
@@ -267,6 +275,8 @@ def test_the_bar_says_how_much_time_is_left(
         (lambda: wf.render_frames(moving(), [0, np.inf]), r"times\[1\] is inf"),
         (lambda: wf.render_frames(moving(), 3), r"times must have shape \(n,\)"),
         (lambda: wf.render_frames(moving(), fps=0), "fps is 0; it must be above 0"),
+        (lambda: wf.render_frames(moving(), [0], shutter=0), "shutter is 0; it must be above 0"),
+        (lambda: wf.render_frames(moving(), [0], shutter=(0, 1)), "shutter must be a number"),
         (lambda: wf.render_frames(moving(), fps=1e9), "makes 2000000000 frames; there may be 1000000"),
         (
             lambda: wf.render_frames(lambda time: moving(), spp=1),
@@ -304,11 +314,14 @@ def test_the_command_writes_what_moves(tmp_path: Path, capsys: pytest.CaptureFix
 
 def test_the_command_turns_the_view_meanwhile(tmp_path: Path) -> None:
     path, places = str(animated(tmp_path / "a.gltf")), []
-    for turn in ("0", "180"):
+    for turn in ("0", "180", "360"):
         pattern = str(tmp_path / f"t{turn}_{{}}.npz")
         assert main(["animate", path, "-o", pattern, "--fps", "2", "--turntable", turn, *OPTIONS]) == 0
         places.append([wf.Image.load(pattern.format(k)).rgb for k in (0, 1)])
     assert (places[0][1] != places[1][1]).any()
+    out = str(tmp_path / "blurred_{}.npz")
+    assert main(["animate", path, "-o", out, "--fps", "2", "--open", "1", *OPTIONS]) == 0
+    assert (wf.Image.load(out.format(0)).rgb != places[0][0]).any()
 
 
 @pytest.mark.parametrize(
@@ -320,6 +333,8 @@ def test_the_command_turns_the_view_meanwhile(tmp_path: Path) -> None:
         (["--animation", "7"], "animation is 7; it must be at least 0 and below 2"),
         (["--end", "0"], "nothing moves for longer than a picture; give --turntable or --end"),
         (["--fps", "0"], "fps is 0"),
+        (["--shutter", "0:1"], "--shutter is for one picture; --open is the part"),
+        (["--open", "0"], "--open is 0.0; it must be above 0"),
         (["-o", "a.webm"], "extension is '.webm'"),
     ],
 )

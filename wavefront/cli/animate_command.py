@@ -3,16 +3,15 @@
 from __future__ import annotations
 
 import argparse
-from collections.abc import Callable
 from copy import copy
 
 from ..animation import check_animation, save_animation
-from ..camera.moves import orbit
 from ..core.errors import SceneError, number
 from ..core.plural import plural
 from ..core.progress import Progress
 from ..drive.frames import frame_times, render_frames
 from ..io.to_scene import choose_camera
+from ..motion.turn import Turn
 from ..scene import Scene
 from .command import SCENE_FILE, add_command
 from .messages import print_done
@@ -41,6 +40,8 @@ def add_animate_command(commands: object) -> None:
     command.add_argument("--fps", type=float, default=24.0, help="pictures per second of the file")
     command.add_argument("--start", type=float, help="seconds of the file (default: where it begins to move)")
     command.add_argument("--end", type=float, help="seconds of the file (default: where all motion is over)")
+    part = "part of the time of a picture for which the shutter is open, such as 0.5"
+    command.add_argument("--open", type=float, metavar="PART", help=part)
     command.add_argument(
         "--turntable", type=float, default=0.0, help="degrees by which the view turns meanwhile"
     )
@@ -65,24 +66,24 @@ def _animate(options: argparse.Namespace) -> int:
             f"{options.scene}: nothing moves for longer than a picture; give --turntable or --end"
         )
     settings = {"progress": progress, **setting_values(options)}
+    if settings.get("shutter") is not None:
+        raise SceneError("--shutter is for one picture; --open is the part of the time of each picture")
+    open_for = None if options.open is None else number("--open", options.open, lambda x: x > 0, "above 0")
+    settings |= {"fps": options.fps, "shutter": open_for}
     images = render_frames(_turning(scene, options, start, end), times, **settings)
     written = save_animation(options.output, images, fps=options.fps, **display)
     print_done(f"{options.output}: {plural(written, 'picture')}")
     return 0
 
 
-def _turning(scene: Scene, options: argparse.Namespace, start: float, end: float) -> Callable[[float], Scene]:
-    """Return what gives the scene of a time, whose camera turns around the middle of all times."""
-    given, turn = framing(options), number("--turntable", options.turntable)
-    up, middle = scene.vertical(options.up), scene.reach.mean(0)
+def _turning(scene: Scene, options: argparse.Namespace, start: float, end: float) -> Scene:
+    """Return a scene with a camera, which turns around the middle of all times."""
+    given, degrees = framing(options), number("--turntable", options.turntable)
     size, view, fov = given["size"], given["view"], given["fov"]
-    framed, _ = choose_camera(scene, None, size, up, view, fov, turning=bool(turn))
-
-    def scene_at(time: float) -> Scene:
-        moment = copy(scene.at(time))
-        camera, _ = choose_camera(moment, None, size, up, view, fov) if scene.camera else (framed, True)
-        angle = turn * (time - start) / (end - start) if end > start else 0.0
-        moment.camera = orbit(camera, middle, angle, up) if turn else camera
-        return moment
-
-    return scene_at
+    camera, _ = choose_camera(scene, None, size, options.up, view, fov, turning=bool(degrees))
+    if degrees:
+        turn = Turn(scene.vertical(options.up), scene.reach.mean(0), degrees, start, max(start, end))
+        camera = camera.transformed(turn)
+    turning = copy(scene)
+    turning.camera = camera
+    return turning

@@ -35,20 +35,22 @@ SceneAt: TypeAlias = Callable[[float], Any]  # what is rendered at a time
 
 
 @takes_settings
-def render_frames(
+def render_frames(  # type: ignore[misc]  # its shutter is a part of a frame
     source: Any,
     times: Iterable[float] | None = None,
     spp: int | None = None,
     *,
     fps: float | None = None,
+    shutter: float | None = None,
     animation: str | int | bool | None = None,
     **settings: Unpack[RenderSettings],
 ) -> Iterator[Image]:
     """Render a scene at several times, one after the other.
 
-    Each image is that of `render(source.at(time))` with the same settings, bit for bit: also its seed is the
-    same one for all frames. What stands still is built once. With an `executor` of your own, such as a client
-    of Dask or an executor of mpi4py, whole frames are its jobs, and the scene is sent to each worker once.
+    Without a shutter each image is that of `render(source.at(time))` with the same settings, bit for bit:
+    also its seed is the same one for all frames. What stands still is built once. With an `executor` of your
+    own, such as a client of Dask or an executor of mpi4py, whole frames are its jobs, and the scene is sent
+    to each worker once.
 
     Parameters
     ----------
@@ -61,6 +63,9 @@ def render_frames(
         As for `render`.
     fps
         Frames per second, 24 by default.
+    shutter
+        Part of the time of a frame for which the shutter is open, around its time: with 0.5 what moves from a
+        quarter of a frame before to a quarter after is blurred. None: each frame is one moment.
     animation
         Of a file: the name or number of one of its animations, as for `load`.
     {settings}
@@ -92,10 +97,16 @@ def render_frames(
     [(16, 16, 3), (16, 16, 3)]
     """
     given: dict[str, Any] = {**settings}
-    scene_at, span = _source(source, animation, given)
-    moments = frame_times(times, fps, span)
+    rate = FPS if fps is None else number("fps", fps, lambda x: x > 0, "above 0")
+    open_for = None
+    if shutter is not None:
+        open_for = number("shutter", shutter, lambda x: x > 0, "above 0") / rate
+    scene_at, span = _source(source, animation, given, open_for is not None)
+    moments = frame_times(times, rate, span)
     own = _with_flow_times(given, moments)
-    jobs = [(each, _settings_of_frame(own[at], at, each)) for at, each in enumerate(moments.tolist())]
+    jobs = [
+        (each, _settings_of_frame(own[at], at, each, open_for)) for at, each in enumerate(moments.tolist())
+    ]
     Settings(spp=spp, **jobs[0][1])  # checks them
     frames = _by_jobs if _takes_frames(given.get("executor")) else _one_by_one
     begin = clock.perf_counter()
@@ -105,7 +116,7 @@ def render_frames(
             yield image
 
 
-def frame_times(times: Any, fps: float | None, span: tuple[float, float] | None) -> Doubles:
+def frame_times(times: Any, fps: float, span: tuple[float, float] | None) -> Doubles:
     """Return the times (n,) of frames, seconds: those given, or all of a span by a number per second.
 
     Raises
@@ -113,7 +124,7 @@ def frame_times(times: Any, fps: float | None, span: tuple[float, float] | None)
     SceneError
         If they are malformed, there is none, or there is no span.
     """
-    rate = FPS if fps is None else number("fps", fps, lambda x: x > 0, "above 0")
+    rate = number("fps", fps, lambda x: x > 0, "above 0")
     if times is not None:
         found = finite_array("times", _as_list(times), (None,))
         if not len(found):
@@ -133,11 +144,12 @@ def _as_list(times: Any) -> ArrayLike:
 
 
 def _source(
-    source: Any, animation: str | int | bool | None, given: dict[str, Any]
+    source: Any, animation: str | int | bool | None, given: dict[str, Any], blurred: bool
 ) -> tuple[SceneAt, tuple[float, float] | None]:
     """Return what gives the scene of a time, and from when to when it moves; None where a function gives it.
 
-    Settings of bare meshes are taken out of those given.
+    Settings of bare meshes are taken out of those given. Where the frames are blurred the scene is the same
+    for all times, and moves.
     """
     if callable(source) and not isinstance(source, type):
         if animation is not None:
@@ -154,15 +166,25 @@ def _source(
         reading=reading,
         coloring=coloring_of(values),
     )
-    return scene.at, (scene.start, scene.end)
+    return partial(_same, scene) if blurred else scene.at, (scene.start, scene.end)
 
 
-def _settings_of_frame(given: dict[str, Any], at: int, time: float) -> dict[str, Any]:
-    """Return the settings of a frame by its number and its time: it has its own checkpoint, and no bar."""
+def _same(scene: Scene, time: float) -> Scene:
+    """Return a scene that moves, whatever the time."""
+    return scene
+
+
+def _settings_of_frame(given: dict[str, Any], at: int, time: float, open_for: float | None) -> dict[str, Any]:
+    """Return the settings of a frame by its number and its time: it has its own checkpoint, and no bar.
+
+    Where the shutter is open for some time, seconds, a camera that is given moves meanwhile.
+    """
     own = {**given, "progress": False}
+    if open_for is not None:
+        own["shutter"] = time - open_for / 2, time + open_for / 2
     if given.get("checkpoint") is not None:
         own["checkpoint"] = numbered(path_name(given["checkpoint"]), at)
-    if given.get("camera") is not None:
+    if given.get("camera") is not None and open_for is None:
         own["camera"] = given["camera"].at(time)
     return own
 
@@ -233,7 +255,8 @@ def _goes_on(
     lists = (before.shapes, scene.shapes), (before.lights, scene.lights)
     same = all(len(a) == len(b) and all(map(is_, a, b)) for a, b in lists)
     same &= before.medium is scene.medium and before.settings == scene.settings
-    same &= settings.get("checkpoint") is None and settings.get("flow_times") is None
+    timed = any(settings.get(name) is not None for name in ("shutter", "flow_times"))
+    same &= settings.get("checkpoint") is None and not timed
     return same and session.suits(camera)
 
 

@@ -337,11 +337,11 @@ class Scene(Answers):
     @property
     def reach(self) -> Doubles:
         """The bounds (2, 3) of all times of the scene, or of the one that it is a moment of."""
-        samples, source = self._samples, self._source
-        if len(samples) == 1:
+        source = self._source
+        if not source._moving.any and source.file_moments is None:
             return self.bounds
         if source._reach is None:
-            boxes = np.stack([each.bounds for each in samples])
+            boxes = np.stack([each.bounds for each in self._samples])
             source._reach = np.stack([boxes[:, 0].min(0), boxes[:, 1].max(0)])
         return source._reach
 
