@@ -6,7 +6,9 @@ import socket
 import threading
 import time
 from collections.abc import Callable, Iterator
+from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager, suppress
+from dataclasses import dataclass
 from functools import partial
 from html import escape
 from typing import TYPE_CHECKING, Any
@@ -52,6 +54,16 @@ BUTTON = (
 )
 
 
+@dataclass(frozen=True)
+class TimeControls:
+    """What sets the time of a scene that moves."""
+
+    span: tuple[float, float]  # start and end, seconds
+    seek: Callable[[float], object]
+    play: Callable[[], object]
+    pause: Callable[[], object]
+
+
 class Page:
     """The page of a viewer.
 
@@ -73,6 +85,8 @@ class Page:
         Called when a browser has loaded the page; it must return at once, too.
     path_of
         Traces the path of a pixel of a view.
+    watch
+        Sets the time of a scene that moves; None for one that is still.
 
     Raises
     ------
@@ -91,9 +105,12 @@ class Page:
         look: Callable[[Viewpoint], object],
         connected: Callable[[], object],
         path_of: PathOf,
+        watch: TimeControls | None = None,
     ) -> None:
+        self._watch = watch
         self._look, self._connected, self._most_spp = look, connected, most_spp
         self._lock = threading.Condition()
+        self._acts = ThreadPoolExecutor(1, thread_name_prefix="wavefront-page-acts")  # starts with the first
         self._viewpoint = viewpoint
         self._exposure, self._choice, self._tone = 0.0, "rgb", tone
         self._frame: ViewerFrame | None = None
@@ -144,6 +161,7 @@ class Page:
         with self._lock:
             self._closed = True
             self._refresh()
+        self._acts.shutdown(wait=False, cancel_futures=True)
         self._presenter.join()
         self._denoiser.close()
         with _silence():
@@ -172,6 +190,8 @@ class Page:
         gui.configure_theme(dark_mode=True, show_logo=False, show_share_button=False)
         gui.set_panel_label("wavefront")
         self._state = gui.add_html(_line("…"))  # markdown would be compiled for each picture
+        if self._watch is not None:
+            self._add_time(self._watch)
         layer = gui.add_dropdown("layer", tuple(CHOICES), initial_value="rgb")
         layer.on_update(self._on(lambda event: self._show_as(choice=event.target.value)))
         tone = gui.add_dropdown("tone", TONE_NAMES, initial_value=self._tone)
@@ -188,6 +208,39 @@ class Page:
         save = gui.add_button("save picture")
         save.on_click(self._on(self._save))
         self._copy = gui.add_html(self._copy_button())
+
+    def _add_time(self, watch: TimeControls) -> None:
+        """Add a slider of the time, and a box to play."""
+        gui, (start, end) = self._server.gui, watch.span
+        step = float(f"{((end - start) or 1.0) / STEPS:.1g}")
+        self._time = gui.add_slider("time", start, max(end, start + step), step, start, hint="seconds")
+        self._time.on_update(self._on(partial(self._scrub, watch)))
+        self._playing = gui.add_checkbox("play", False)
+        self._playing.on_update(self._on(partial(self._play, watch)))
+
+    def tell_time(self, time: float) -> None:
+        """Show the time of a scene that plays."""
+        self._time.value = time
+
+    def _scrub(self, watch: TimeControls, event: Any) -> None:
+        if event.client is not None:  # not the clock
+            time = within("time", event.target.value, *watch.span)
+            self._playing.value = False
+            self._apart(partial(watch.seek, time))
+
+    def _play(self, watch: TimeControls, event: Any) -> None:
+        if event.client is not None:
+            self._apart(watch.play if event.target.value else watch.pause)
+
+    def _apart(self, act: Callable[[], object]) -> None:
+        """Do what takes longer than the event loop may wait, in the order in which it was asked for."""
+        self._acts.submit(self._tried, act)
+
+    def _tried(self, act: Callable[[], object]) -> None:
+        try:
+            act()
+        except (SceneError, RenderError) as error:
+            self.say(str(error))
 
     def _copy_button(self) -> str:
         code = escape(self._viewpoint.code, quote=True)

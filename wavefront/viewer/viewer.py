@@ -7,13 +7,15 @@ import sys
 import threading
 import webbrowser
 from collections.abc import Callable
+from contextlib import suppress
 from copy import copy
+from functools import partial
 from importlib.util import find_spec
 from typing import TYPE_CHECKING, Any, Self, Unpack
 
 from ..camera import Camera
 from ..codecs.tone import AUTO, TONE_NAMES
-from ..core.errors import RenderError, SceneError, one_of
+from ..core.errors import RenderError, SceneError, number, one_of
 from ..core.suggestions import suggests_keywords
 from ..drive import Session
 from ..drive.notebook import in_kernel
@@ -24,6 +26,7 @@ from ..scene.state import scene_state
 from ..settings import DEFAULT_SPP, RenderSettings, refuse, takes_settings
 from ..workers.executors import choose_executor, needs_pickling, worker_count
 from .guard import token_of
+from .player import Player
 from .priority import giving_way
 from .refiner import FIRST_DIVISOR, Refiner, ViewerFrame
 from .shown import VIEWER_AOVS
@@ -36,6 +39,7 @@ if TYPE_CHECKING:
 # Paths: a movement waits for less of a smaller wave, and one of half the size costs 10 % more.
 WAVE_SIZE = 1 << 15
 POLL = 0.5  # seconds
+FIRST_SEEN = 10.0  # seconds that a moment is waited for while a scene plays
 WATCH = 0.5  # seconds between looks at whether the scene has changed
 FRAME = "100%", 600  # width and height of the page in a notebook
 # settings that decide where paths go
@@ -81,6 +85,8 @@ class Viewer:
         Samples per pixel of the last picture of a view; None where they are not known before.
     path_of
         Traces the path of a pixel of a view.
+    span
+        Start and end of a scene that moves, seconds; None of one that is still.
 
     Attributes
     ----------
@@ -106,11 +112,13 @@ class Viewer:
         token: str,
         tone: str,
         spp: int | None,
-        renew: Callable[[], Session] | None = None,
+        renew: Callable[[float | None], Session] | None = None,
         state: Callable[[], object] | None = None,
         path_of: PathOf | None = None,
+        span: tuple[float, float] | None = None,
     ) -> None:
         self._renew, self._state = renew, state
+        self._player = None if span is None else Player(span, self._play_on)
         self._wanted: Camera | None = None
         self._latest: ViewerFrame | None = None
         self._error: Exception | None = None  # that ended the newest view
@@ -121,12 +129,13 @@ class Viewer:
         try:
             self._refiner.start()
             self._look(viewpoint)
-            from .page import Page  # while workers trace, as it takes long to import viser
+            from .page import Page, TimeControls  # while workers trace, as it takes long to import viser
 
             path_of = path_of or _no_path
-            self._page = Page(
-                host, port, token, viewpoint, spp, tone, self._look, self._refiner.refine, path_of
-            )
+            look, seen, watch = self._look, self._refiner.refine, None
+            if span is not None:
+                watch = TimeControls(span, self.seek, self.play, self.pause)
+            self._page = Page(host, port, token, viewpoint, spp, tone, look, seen, path_of, watch)
         except BaseException:
             self._refiner.close()
             raise
@@ -210,10 +219,71 @@ class Viewer:
             raise RenderError("the viewer is closed")
         if self._state is not None:
             self._shown_state = self._state()
-        session = self._renew()
+        session = self._renew(self.time)
         with self._news:
             self._wanted, self._error = copy(self.camera), None  # a view of its own, to be waited for
         self._refiner.replace(session, self._wanted)
+
+    # --- Time -----------------------------------------------------------------------------------------
+
+    @property
+    def time(self) -> float | None:
+        """The time that is shown of a scene that moves, seconds; None of one that is still."""
+        return None if self._player is None else self._player.time
+
+    def seek(self, time: float) -> None:
+        """Show the scene at another time.
+
+        Parameters
+        ----------
+        time
+            Seconds of the scene.
+
+        Raises
+        ------
+        SceneError
+            If the time is not finite, or nothing moves.
+        RenderError
+            If the viewer is closed.
+        """
+        player = self._moving()
+        player.pause()
+        player.time = number("time", time)
+        self.update()
+
+    def play(self) -> None:
+        """Let the time of the scene run on, again and again, until `pause`.
+
+        Of each moment there is a quick picture; it refines when the time stands still.
+
+        Raises
+        ------
+        SceneError
+            If nothing moves.
+        """
+        self._moving().play()
+
+    def pause(self) -> None:
+        """Hold the time; the picture refines."""
+        self._moving().pause()
+
+    def _moving(self) -> Player:
+        if self._player is None:
+            raise SceneError("nothing moves in the scene of the viewer")
+        return self._player
+
+    def _play_on(self, time: float) -> None:
+        """Show a moment, and wait for its first picture."""
+        with suppress(RenderError):  # it has been closed
+            self.update()
+            with self._news:
+                self._news.wait_for(lambda: self._seen() or self._closed.is_set(), FIRST_SEEN)
+            if self._page is not None:
+                self._page.tell_time(time)
+
+    def _seen(self) -> bool:
+        """Return whether there is a picture of the newest view."""
+        return self._error is not None or (self._latest is not None and self._latest.camera is self._wanted)
 
     def _watch(self) -> None:
         """Update the picture when the scene has changed, and has not since."""
@@ -245,6 +315,8 @@ class Viewer:
         atexit.unregister(self.close)
         with self._news:
             self._news.notify_all()
+        if self._player is not None:
+            self._player.pause()
         self._refiner.close()
         if self._page is not None:
             self._page.close()
@@ -367,7 +439,7 @@ def _opened(
     up = scene.vertical(settings.get("up", "auto"))
     framing = settings.pop("view", None), settings.pop("fov", None)
     camera, _ = choose_camera(scene, settings.get("camera"), settings.get("size"), up, *framing)
-    viewpoint = Viewpoint.of(camera, scene.bounds, up)
+    viewpoint = Viewpoint.of(camera.at(scene.start), scene.reach, up)
     aovs = settings.pop("aovs", ())
     wanted = (*((aovs,) if isinstance(aovs, str) else aovs), *VIEWER_AOVS)
     width, height = (max(1, side // FIRST_DIVISOR) for side in viewpoint.camera.resolution)
@@ -377,20 +449,24 @@ def _opened(
     if settings.get("executor") is None:
         settings["executor"] = _executor(settings.get("workers"), (spp or DEFAULT_SPP) * viewpoint.pixels)
 
-    def renew() -> Session:
+    shown = [scene]  # at the time that is shown
+
+    def renew(time: float | None) -> Session:
         scene.check()
+        shown[0] = scene if time is None else scene.at(time)
         with giving_way():
-            return Session(scene, spp, **settings)
+            return Session(shown[0], spp, **settings)
 
     def path_of(view: Viewpoint, pixel: tuple[int, int]) -> PathVertices:
         from ..watching.trace import Wave  # here, as few look at a path
 
         known = {name: value for name, value in settings.items() if name in OF_PATHS}
-        return Wave(scene, size=None, camera=view.camera, **known).path(pixel, sample=0)
+        return Wave(shown[0], size=None, camera=view.camera, **known).path(pixel, sample=0)
 
-    return Viewer(
-        renew(), viewpoint, host, port, token, tone, spp, renew, lambda: scene_state(scene), path_of
-    )
+    span = (scene.start, scene.end) if scene.moves else None
+    first = renew(None if span is None else span[0])
+    state = partial(scene_state, scene)
+    return Viewer(first, viewpoint, host, port, token, tone, spp, renew, state, path_of, span)
 
 
 def _no_path(view: Viewpoint, pixel: tuple[int, int]) -> PathVertices:
