@@ -234,6 +234,7 @@ READ = [
     row(light, "directional", {"direction": [0, 0, -1]}, direction=[0, 0, -2]),
     row(light, "directional", {"irradiance": 3}, irradiance=3.0),
     row(light, "spot", {"angle": 60, "blend": 0.5, "falloff": "linear"}, cutoff_angle=30.0, beam_width=15.0),
+    row(light, "spot", {"angle": 40, "blend": 0.25}),
     row(light, "spot", {"direction": [1, 0, 0]}, to_world=TURN),
     # cameras and settings
     row(camera, "perspective", {"resolution": (768, 576)}),
