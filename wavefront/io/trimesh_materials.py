@@ -78,14 +78,12 @@ def _pbr(material: Any) -> MaterialSpec:
     factor = np.asarray(_given(material, "baseColorFactor", np.full(4, 255))) / 255.0
     base = texture("baseColorTexture", scale=factor[:3])
     wanted: dict[str, Any] = {"base_color": factor[:3] if base is None else base}
-    alpha: Any = None
     cutoff = float(_given(material, "alphaCutoff", 0.5)) if material.alphaMode == "MASK" else None
-    if material.alphaMode in ("MASK", "BLEND"):
-        alpha = float(factor[3])
-        if base is not None and base.has_alpha:
-            alpha = texture("baseColorTexture", srgb=False, channel=3, scale=alpha)
-        if isinstance(alpha, Texture) or alpha != 1:
-            wanted |= {"alpha": alpha, "alpha_cutoff": cutoff}
+    alpha: Any = float(factor[3]) if material.alphaMode in ("MASK", "BLEND") else None
+    if alpha is not None and base is not None and base.has_alpha:
+        alpha = texture("baseColorTexture", srgb=False, channel=3, scale=alpha)
+    if isinstance(alpha, Texture) or alpha not in (None, 1):
+        wanted |= {"alpha": alpha, "alpha_cutoff": cutoff}
     fill(
         wanted,
         METALLIC_ROUGHNESS,
@@ -94,16 +92,25 @@ def _pbr(material: Any) -> MaterialSpec:
             texture(row.image, srgb=False, channel=row.channel, scale=value) if value else None
         ),
     )
-    glow = np.asarray(_given(material, "emissiveFactor", np.zeros(3)), np.float64)
-    radiance = texture("emissiveTexture", scale=glow) if glow.any() else None
-    normal_map = None
-    bumps = material.normalTexture  # trimesh does not keep its scale
-    if bumps is not None and bumps.size != (1, 1):  # which is even, or in place of a missing image
-        normal_map = NormalMap(Texture(_picture(bumps), False))
-    made, lost = build_material(wanted, normal_map)
+    made, lost = build_material(wanted, _normal_map(material))
     occluded = ["occlusionTexture"] if material.occlusionTexture is not None else []
-    emission = glow if radiance is None and glow.any() else radiance
-    return MaterialSpec(made, emission, bool(material.doubleSided), occluded + lost, alpha, cutoff)
+    both = bool(material.doubleSided)
+    return MaterialSpec(made, _radiance(material, texture), both, occluded + lost, alpha, cutoff)
+
+
+def _radiance(material: Any, texture: _Textures) -> Any:
+    glow = np.asarray(_given(material, "emissiveFactor", np.zeros(3)), np.float64)
+    if not glow.any():
+        return None
+    varying = texture("emissiveTexture", scale=glow)
+    return glow if varying is None else varying
+
+
+def _normal_map(material: Any) -> NormalMap | None:
+    bumps = material.normalTexture  # trimesh does not keep its scale
+    if bumps is None or bumps.size == (1, 1):  # which is even, or in place of a missing image
+        return None
+    return NormalMap(Texture(_picture(bumps), False))
 
 
 def _given(material: Any, name: str, default: Any) -> Any:
