@@ -36,6 +36,7 @@ SHAPES = {  # the picture of --size 24, (height, width)
     "milk": (24, 24),
     "molecule": (16, 24),
     "office": (440, 1200),
+    "optical_flow": (16, 48),
     "own_material": (15, 24),
     "photograph": (16, 24),
     "scan": (16, 24),

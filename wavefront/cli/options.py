@@ -93,6 +93,11 @@ def shutter(text: str) -> tuple[float, float]:
     return begin, end
 
 
+def times(text: str) -> list[float]:
+    """Return T,T,... as numbers."""
+    return [_finite(part) for part in text.split(",")]
+
+
 def flow_times(text: str) -> tuple[float, float]:
     """Return BEFORE:AFTER as two times."""
     before, after = _parts(text, ":", float, 2, f"{text!r} is not BEFORE:AFTER, such as 0.46:0.54")

@@ -27,6 +27,7 @@ from .options import (
     framing,
     read_scene,
     setting_values,
+    times,
 )
 
 
@@ -72,6 +73,7 @@ def add_dataset_command(commands: Any) -> None:
         "render views around a scene with annotations, for machine learning",
         [
             "wavefront dataset scene.glb -o set --views 200 --spp 64 --size 640x480",
+            "wavefront dataset walk.glb -o set --views 4 --times 0,0.1,0.2 --format kitti",
             "wavefront dataset parts.obj -o set --format coco --format bop --object bolt --object nut",
         ],
     )
@@ -92,6 +94,9 @@ def add_dataset_command(commands: Any) -> None:
         metavar="NAME",
         help="shapes to annotate; can be given several times (default: all; wavefront info lists them)",
     )
+    command.add_argument(
+        "--times", type=times, metavar="T,T,...", help="seconds at which each camera sees a scene that moves"
+    )
     command.add_argument("--millimeters", type=float, default=1000.0, help="length of a scene unit, for BOP")
     command.add_argument(
         "--depth-scale", type=float, help="millimeters of a code of BOP's depth (default: 0.1 or more)"
@@ -108,15 +113,17 @@ def _dataset(options: argparse.Namespace) -> int:
         scene,
         cameras,
         format=options.format or FORMATS[0],
+        times=options.times,
         objects=options.object or None,
         millimeters=options.millimeters,
         depth_scale=options.depth_scale,
         **display,
         **settings,
     )
-    earlier = len(cameras) - rendered
+    views = len(cameras) * len(options.times or "1")
+    earlier = views - rendered
     before = f", {earlier} of them there before" if earlier else ""
-    print_done(f"{options.output}: {plural(len(cameras), 'view')}{before}")
+    print_done(f"{options.output}: {plural(views, 'view')}{before}")
     return 0
 
 

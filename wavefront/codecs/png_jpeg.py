@@ -7,6 +7,7 @@ Source of the format: W3C, Portable Network Graphics (third edition), 2025.
 from __future__ import annotations
 
 import zlib
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -99,17 +100,22 @@ def _png_info(gamma: Gamma) -> Any:
 
 def _encode_16(codes: NDArray[np.uint16], gamma: Gamma) -> bytes:
     """Return a png of codes (H, W, 3 or 4)."""
+    return png_of_codes(codes, _png_chunks(gamma))
+
+
+def png_of_codes(codes: NDArray[Any], about: Sequence[tuple[bytes, bytes]] = ()) -> bytes:
+    """Return a png of codes (H, W, 3 or 4), uint8 or uint16, with chunks (name, content) that say more."""
     height, width, channels = codes.shape
-    rows = codes.astype(">u2").view(np.uint8).reshape(height, -1)
+    rows = codes.astype(codes.dtype.newbyteorder(">")).view(np.uint8).reshape(height, -1)
     differences = rows.copy()
     differences[1:] -= rows[:-1]
     filtered = np.concatenate([np.full((height, 1), FILTER_UP, np.uint8), differences], axis=1)
     deflate = zlib.compressobj(strategy=PNG_DEFLATE)
     header = b"".join(n.to_bytes(4, "big") for n in (width, height)) + bytes(
-        [16, COLOR_TYPES[channels], 0, 0, 0]
+        [8 * codes.itemsize, COLOR_TYPES[channels], 0, 0, 0]
     )
     pixels = deflate.compress(filtered.tobytes()) + deflate.flush()
-    chunks = ((b"IHDR", header), *_png_chunks(gamma), (b"IDAT", pixels), (b"IEND", b""))
+    chunks = ((b"IHDR", header), *about, (b"IDAT", pixels), (b"IEND", b""))
     return PNG + b"".join(
         len(content).to_bytes(4, "big") + name + content + zlib.crc32(name + content).to_bytes(4, "big")
         for name, content in chunks

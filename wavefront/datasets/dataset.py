@@ -17,7 +17,7 @@ from ..codecs.white_balance import WhiteBalance
 from ..core.errors import SceneError, iterable, number, one_of
 from ..core.files import make_folder, path_name, read_json, write_json
 from ..drive import Session
-from ..film.aov_names import chosen_aovs
+from ..film.aov_names import chosen_aovs, flow_names
 from ..film.identity import differences
 from ..io.to_scene import as_scene
 from ..scene import Scene
@@ -25,10 +25,13 @@ from ..settings import RenderSettings, refuse, takes_settings
 from .annotated import AnnotatedObject, annotated_objects
 from .bop import BopLayout
 from .coco import CocoLayout
+from .flow import FLOW_LAYOUTS, check_times
+from .moments import Moment, PlannedView, checked_times, moments
 from .view import DatasetView, camera_matrices, view_name
 
-FORMATS = ("coco", "bop")
+FORMATS = ("coco", "bop", *FLOW_LAYOUTS)
 AOVS_NEEDED = ("depth", "normal", "shape_id")
+AOVS_OF_FLOW = ("flow", "flow_occluded")
 AOVS_FOLDER, VIEWS_FOLDER = "layers", "views"
 GOES_ON = "write_dataset goes on with views that are missing"
 REFUSED = {"checkpoint": GOES_ON, "samples": GOES_ON, "camera": "write_dataset takes cameras"}
@@ -55,6 +58,7 @@ def write_dataset(
     spp: int | None = None,
     *,
     format: str | Sequence[str] = "coco",
+    times: Iterable[float] | None = None,
     objects: Iterable[str] | None = None,
     millimeters: float = 1000.0,
     depth_scale: float | None = None,
@@ -76,9 +80,12 @@ def write_dataset(
     scene, spp
         As for `render`.
     cameras
-        Perspective or fisheye cameras, one for each view.
+        Perspective or fisheye cameras, one for each view; or with `times` one for each sequence of views.
     format
-        "coco", "bop", or both. With "bop" cameras are perspective ones without distortion.
+        One or several of "coco"; "bop", whose cameras are perspective ones without distortion; and, with
+        optical flow from each time to the next, "kitti" and "sintel".
+    times
+        Seconds, rising: every camera sees the scene at each of them, and moves if it has a motion.
     objects
         Names of the shapes to annotate, for example without the floor; by default all shapes.
     millimeters
@@ -115,7 +122,8 @@ def write_dataset(
     refuse(settings, REFUSED)
     subject = as_scene(scene, settings.pop("material", None), settings.get("progress"))
     root = Path(path_name(folder))
-    chosen = _chosen_formats(format)
+    chosen, seconds = _chosen_formats(format), checked_times(times, settings.get("shutter"))
+    check_times(chosen, seconds)
     annotated = annotated_objects(subject.shapes, objects)
     layouts: dict[str, Layout] = {}
     if "coco" in chosen:
@@ -124,12 +132,15 @@ def write_dataset(
         layouts["bop"] = BopLayout(
             root, subject.shapes, annotated, _length("millimeters", millimeters), _scale(depth_scale)
         )
+    for name in FLOW_LAYOUTS.keys() & set(chosen):
+        layouts[name] = FLOW_LAYOUTS[name](root)
     views = _checked_cameras(cameras, settings.pop("size", None), layouts)
     display = Display(gamma, exposure, tone, white_balance)
-    settings["camera"] = views[0]
     if settings.get("denoise") is None:  # what learns from pictures must not learn a denoiser's ways
         settings["denoise"] = bool(subject.settings.get("denoise"))
-    settings["aovs"] = (*chosen_aovs("aovs", settings.get("aovs", ())), *AOVS_NEEDED)
+    asked, own = chosen_aovs("aovs", settings.get("aovs", ())), AOVS_NEEDED
+    settings["aovs"] = (*asked, *own, *(AOVS_OF_FLOW if FLOW_LAYOUTS.keys() & set(chosen) else ()))
+    plan = moments(subject, views, seconds, bool(flow_names(settings["aovs"])))
     about = {
         "format": sorted(chosen),
         "objects": [[item.shape, item.name] for item in annotated.values()],
@@ -141,8 +152,8 @@ def write_dataset(
         "denoise": settings["denoise"],
         "seconds": settings.get("seconds"),
     }
-    writer = _Writer(root, subject, annotated, layouts, display, about)
-    return writer.write(views, Session(subject, spp, **settings))
+    writer = _Writer(root, subject, layouts, display, about)
+    return writer.write(plan, spp, settings, objects)
 
 
 class _Writer:
@@ -152,29 +163,34 @@ class _Writer:
         self,
         root: Path,
         scene: Scene,
-        objects: dict[int, AnnotatedObject],
         layouts: dict[str, Layout],
         display: Display,
         about: dict[str, Any],
     ) -> None:
-        self._root, self._scene, self._objects = root, scene, objects
+        self._root, self._scene = root, scene
         self._layouts, self._display, self._about = layouts, display, about
 
-    def write(self, cameras: Sequence[Camera], session: Session) -> int:
+    def write(
+        self, plan: list[Moment], spp: int | None, settings: RenderSettings, names: Iterable[str] | None
+    ) -> int:
         """Write the data set; return how many views were rendered."""
         for each in (self._root, self._root / AOVS_FOLDER, self._root / VIEWS_FOLDER):
             make_folder(each)
-        records, rendered = {}, 0
-        with session:
-            for at, camera in enumerate(cameras):
-                if at:
-                    session.set_camera(camera)
-                identity = self._identity(session)
-                record = self._earlier(at, identity)
-                if record is None:
-                    record = self._render(at, camera, session, identity)
-                    rendered += 1
-                records[at] = record
+        found, rendered = dict[int, dict[str, Any]](), 0
+        for moment in plan:
+            given: Any = {**settings, **moment.about, "camera": moment.views[0].camera}
+            objects = annotated_objects(moment.scene.shapes, names)
+            with Session(moment.scene, spp, **given) as session:
+                for view in moment.views:
+                    if view is not moment.views[0]:
+                        session.set_camera(view.camera)
+                    identity = self._identity(session, moment)
+                    record = self._earlier(view.number, identity)
+                    if record is None:
+                        record = self._render(view, objects, session, identity)
+                        rendered += 1
+                    found[view.number] = record
+        records = dict(sorted(found.items()))
         write_json(
             self._root / "cameras.json", {view_name(at): each["camera"] for at, each in records.items()}
         )
@@ -182,10 +198,11 @@ class _Writer:
             layout.write_index({at: each["layouts"][name] for at, each in records.items()})
         return rendered
 
-    def _identity(self, session: Session) -> dict[str, Any] | None:
+    def _identity(self, session: Session, moment: Moment) -> dict[str, Any] | None:
         """Return what a view must have in common with this one; None if it cannot be compared."""
+        about = {name: list(value) for name, value in moment.about.items()}
         try:
-            return {**session.identity(), **self._about}
+            return {**session.identity(), **self._about, **about}
         except SceneError:
             return None
 
@@ -206,15 +223,23 @@ class _Writer:
         return record
 
     def _render(
-        self, at: int, camera: Camera, session: Session, identity: dict[str, Any] | None
+        self,
+        planned: PlannedView,
+        objects: dict[int, AnnotatedObject],
+        session: Session,
+        identity: dict[str, Any] | None,
     ) -> dict[str, Any]:
         """Render a view and write its files, its record as the last one."""
-        image = session.run()
-        view = DatasetView(at, camera, image, self._objects, self._display, session.silhouettes)
+        image, camera = session.run(), planned.camera
+        place = planned.frame, planned.frames
+        view = DatasetView(planned.number, camera, image, objects, self._display, session.silhouettes, *place)
         image.save(self._root / AOVS_FOLDER / f"{view.name}.exr")
         record = {
             "identity": identity,
-            "camera": camera_matrices(camera, self._farthest(camera)),
+            "camera": {
+                **({} if planned.time is None else {"time": planned.time}),
+                **camera_matrices(camera, self._farthest(camera)),
+            },
             "layouts": {name: layout.write_view(view) for name, layout in self._layouts.items()},
         }
         write_json(self._root / VIEWS_FOLDER / f"{view.name}.json", record)
@@ -222,14 +247,14 @@ class _Writer:
 
     def _farthest(self, camera: Camera) -> float:
         """Return a depth greater than that of all points of the scene."""
-        low, high = self._scene.bounds
+        low, high = self._scene.reach
         return float(np.linalg.norm(camera.origin - (low + high) / 2) + np.linalg.norm(high - low))
 
 
 def _chosen_formats(value: str | Sequence[str]) -> list[str]:
     names = [value] if isinstance(value, str) else list(value)
     if not names:
-        raise SceneError(f"format is empty; it must be one of {', '.join(FORMATS)}, or both")
+        raise SceneError(f"format is empty; it must be one of {', '.join(FORMATS)}, or several")
     return [one_of("format", name, FORMATS) for name in names]
 
 

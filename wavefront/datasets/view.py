@@ -29,6 +29,8 @@ class DatasetView:
     objects: dict[int, AnnotatedObject]  # by the number of the shape
     display: Display
     silhouettes: Silhouettes
+    frame: int = 0  # its place among the times of its camera
+    frames: int = 1  # how many of them there are
 
     @property
     def name(self) -> str:

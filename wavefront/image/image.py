@@ -16,13 +16,14 @@ from ..arrays.vec import Bools, Doubles, Floats
 from ..camera import Camera, ImageSize
 from ..codecs import png_jpeg
 from ..codecs.display import Display
+from ..codecs.flow import write_flow
 from ..codecs.image_data import ERROR, ImageData
 from ..codecs.images import read_picture, write_image
 from ..codecs.png_jpeg import Gamma
 from ..codecs.tone import AUTO
 from ..codecs.white_balance import WhiteBalance
 from ..colors import EFFICACY, rgb, to_photometric
-from ..core.errors import SceneError, as_array, in_brief, iterable, mapping, number, one_of, shape_of
+from ..core.errors import SceneError, as_array, flag, in_brief, iterable, mapping, number, one_of, shape_of
 from ..core.html import picture_html
 from ..core.suggestions import Answers, did_you_mean, suggests_keywords
 from ..film.aov_names import (
@@ -32,6 +33,7 @@ from ..film.aov_names import (
     CLAMPED,
     FLOW_AOVS,
     GIVEN_AOVS,
+    MASKS,
     NOISY,
     STANDARD_ERROR,
     VARIANCE,
@@ -853,6 +855,44 @@ class Image(Answers):
             If gamma, exposure, tone or white balance is out of range.
         """
         write_image(path, self._data(), Display(gamma, exposure, tone, white_balance), bits)
+
+    @suggests_keywords
+    def save_flow(self, path: str | os.PathLike[str], name: str = "flow", *, hidden: bool = True) -> None:
+        """Write optical flow as Middlebury's .flo or KITTI's .png, as OpenCV and torchvision read them.
+
+        A png has steps of 1/64 pixel, and no flow of 512 pixels or more.
+
+        Parameters
+        ----------
+        path
+            Where to write.
+        name
+            "flow", to the picture after this one, or "flow_back", to the one before.
+        hidden
+            Whether what the other picture does not show has a flow, too. Without it the AOV "flow_occluded"
+            or "flow_back_occluded" is needed.
+
+        Raises
+        ------
+        SaveError
+            If the file cannot be written, or has another extension.
+        SceneError
+            If a layer is missing, or an argument is something else.
+
+        Examples
+        --------
+        >>> spheres = wf.Spheres([[(0, 0, 0)], [(1, 0, 0)]], 0.5, times=[0, 1])
+        >>> image = wf.render(spheres, 1, size=32, aovs=("flow", "flow_occluded"), flow_times=(0, 0.1))
+        >>> image.save_flow("000000_10.png", hidden=False)
+        """
+        known = tuple(each for each in FLOW_AOVS if each not in MASKS)
+        layer = self.layers.get(one_of("name", name, known))
+        mask = self.layers.get(f"{name}_occluded")
+        if layer is None or (mask is None and not flag("hidden", hidden)):
+            missing = name if layer is None else f"{name}_occluded"
+            raise SceneError(f"the image has no layer {missing!r}; render it with aovs=({missing!r},)")
+        valid = np.isfinite(layer).all(2)
+        write_flow(path, layer, valid if hidden or mask is None else valid & (mask == 0))
 
     @suggests_keywords
     def plot(self, name: str = "rgb", axes: Any = None, *, cmap: Any = "viridis") -> Any:
