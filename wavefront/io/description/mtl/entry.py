@@ -128,11 +128,11 @@ class Entry:
         return default if values is None else values[0]
 
     def part(self, key: str, default: float) -> float:
-        """Return a number, clamped to [0, 1] with a warning."""
-        value = self.number(key, default)
-        if not 0 <= value <= 1:
-            self.note(key, exact(value), "clamped, as it must be in [0, 1]")
-        return min(max(value, 0.0), 1.0)
+        """Return a number, clamped to the range of its keyword with a warning."""
+        value, high = self.number(key, default), keyword_of(key).high
+        if not 0 <= value <= high:
+            self.note(key, exact(value), f"clamped, as it must be in [0, {high:g}]")
+        return min(max(value, 0.0), high)
 
     def color(self, key: str, default: float) -> Doubles:
         """Return a color (3,), clamped to the range of its keyword with a warning."""

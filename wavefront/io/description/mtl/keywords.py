@@ -30,7 +30,7 @@ class Keyword(NamedTuple):
     """What stands after a keyword."""
 
     kind: Kind
-    high: float = 1.0  # the least value is 0
+    high: float = 1.0  # the greatest value of a color or a part; the least one is 0
     neutral: float | None = None  # the value without an effect
     idle: bool = False  # it may be without an effect, whatever its value
     multiplied: bool = False  # its image may have a multiplier, -bm
@@ -45,7 +45,6 @@ PBR = (
     Parameter("clearcoat_roughness", "pcr", 1.0, "map_pcr", neutral=0.0),
     Parameter("anisotropy", "aniso", 1.0, "map_aniso", neutral=0.0),
 )
-LARGEST_ILLUM, LARGEST_NS = 9, 1000.0
 KEYWORDS = {
     "ka": Keyword(Kind.UNREAD, neutral=0.0),
     "kd": Keyword(Kind.COLOR, neutral=0.0),
@@ -54,9 +53,9 @@ KEYWORDS = {
     "tf": Keyword(Kind.COLOR, neutral=1.0),
     "d": Keyword(Kind.NUMBER, neutral=1.0),
     "tr": Keyword(Kind.NUMBER, neutral=0.0),
-    "ns": Keyword(Kind.NUMBER, high=LARGEST_NS, idle=True),  # without a gloss
-    "ni": Keyword(Kind.NUMBER, high=MAX_INDEX, idle=True),  # without glass
-    "illum": Keyword(Kind.NUMBER, high=LARGEST_ILLUM),
+    "ns": Keyword(Kind.NUMBER, idle=True),  # without a gloss
+    "ni": Keyword(Kind.NUMBER, idle=True),  # without glass
+    "illum": Keyword(Kind.NUMBER),
     "sharpness": Keyword(Kind.UNREAD, neutral=60.0),
     "map_kd": Keyword(Kind.PICTURE),
     "map_ks": Keyword(Kind.PICTURE),

@@ -15,16 +15,18 @@ from ....textures.normal_map import BaseNormalMap, BumpMap, NormalMap
 from ..appearance import MaterialSpec, build_material
 from ..parameters import fill
 from .entry import Entry
-from .keywords import BUMPS, LARGEST_ILLUM, LARGEST_NS, PBR, Kind
+from .keywords import BUMPS, PBR, Kind
 
 # values of `illum`
 GLASS = (4, 6, 7, 9)
 MIRROR = (3, 5, 8)
 NO_HIGHLIGHT = (0, 1)
+LARGEST_ILLUM = 9
 
 GLASS_IOR = 1.5
 MATTE = 0.5  # default reflectance
 KS_F0 = 0.08  # the reflectance of `Ks 1`
+LARGEST_NS = 1000.0
 LEAST_F0 = 0.02  # of dielectrics; a lower reflectance is weaker at all angles
 
 
