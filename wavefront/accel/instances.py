@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..arrays.soa import soa
-from ..arrays.vec import Bools, Doubles, Floats, Ints, f4
+from ..arrays.vec import Bools, Doubles, Floats, Ints, f4, spans
 from .base import Accelerator, Intersections
 from .build import build_tree
 
@@ -55,10 +55,11 @@ class InstanceAccelerator:
         self._single, self._meshes, self.placements = single, meshes, placements
         self._first = int(placements.first[0])
         tree = build_tree(placements.low, placements.high, 1, WIDTH)
+        self._width = int(np.flatnonzero(tree.child.any(0)).max(initial=0)) + 1  # few instances need less
         self._low, self._high = (
-            np.ascontiguousarray(box.transpose(2, 1, 0)) for box in (tree.low, tree.high)
+            np.ascontiguousarray(box[:, : self._width].transpose(2, 1, 0)) for box in (tree.low, tree.high)
         )
-        self._child = tree.child.astype(np.intp)
+        self._child = tree.child[:, : self._width].astype(np.intp)
         self._instance = tree.prim[:, 0]
 
     def closest(self, origin: Floats, direction: Floats, exclude_prim: Ints) -> Intersections:
@@ -123,6 +124,9 @@ class InstanceAccelerator:
 
     def _by_mesh(self, instance: Ints) -> Iterator[tuple[int, Ints]]:
         """Yield each distinct mesh of `instance` (p,), and the indices of its instances there."""
+        if len(self._meshes) == 1:
+            yield 0, np.arange(instance.size)
+            return
         mesh = self.placements.mesh.take(instance)
         order = np.argsort(mesh, kind="stable")
         numbers, begins = np.unique(mesh.take(order), return_index=True)
@@ -134,6 +138,9 @@ class InstanceAccelerator:
         `t_far` (n,) is the largest distance at which a hit still matters; the caller lowers it.
         """
         n = origin.shape[1]
+        if self.placements.mesh.size == 1:
+            yield self._alone(origin, direction, t_far)
+            return
         parts = [(at, min(at + (1 << LANE_BITS), n)) for at in range(0, n, 1 << LANE_BITS)]
         while parts:
             begin, end = parts.pop()
@@ -145,6 +152,18 @@ class InstanceAccelerator:
             else:
                 middle = (begin + end) // 2
                 parts += [(middle, end), (begin, middle)]
+
+    def _alone(self, origin: Floats, direction: Floats, t_far: Floats) -> tuple[Ints, Ints]:
+        """Return the lanes that may meet the only instance there is, and its number for each."""
+        with np.errstate(all="ignore"):
+            inverse = f4(1) / direction
+        root, every = np.zeros(min(CHUNK, t_far.size), np.intp), np.arange(t_far.size)
+        met = [
+            self._children_met(root[: part.stop - part.start], every[part], origin, inverse, t_far)[1]
+            for part in spans(t_far.size, CHUNK)
+        ]
+        lane = np.concatenate([root[:0], *met])
+        return lane, np.zeros_like(lane)
 
     @property
     def _instance_bits(self) -> int:
@@ -159,11 +178,8 @@ class InstanceAccelerator:
         total = 0
         while code.size:
             codes, lanes = [], []
-            for at in range(0, code.size, CHUNK // WIDTH):
-                some = lane[at : at + CHUNK // WIDTH]
-                child, lane_met, near = self._children_met(
-                    code[at : at + CHUNK // WIDTH], some, origin, inverse, t_far
-                )
+            for part in spans(code.size, CHUNK // self._width):
+                child, lane_met, near = self._children_met(code[part], lane[part], origin, inverse, t_far)
                 leaf = np.flatnonzero(child < 0)
                 instance = self._instance.take(-1 - child.take(leaf))
                 packed.append(_pack(lane_met.take(leaf), near.take(leaf), instance, self._instance_bits))
@@ -184,7 +200,7 @@ class InstanceAccelerator:
         Returns child codes, lanes and entry distances of the boxes that are met. NaN, from a ray along the
         face of a box, counts as met.
         """
-        near = np.zeros((WIDTH, node.size), f4)
+        near = np.zeros((self._width, node.size), f4)
         far = np.broadcast_to(t_far.take(lane) * (1 + ROUNDING), near.shape)
         with np.errstate(all="ignore"):
             for axis in range(3):
@@ -246,9 +262,10 @@ def _update_closest(hits: Intersections, lane: Ints, found: Intersections) -> No
     """Replace hits on lanes (p,), of which some may be equal, by those of `found` that are nearer."""
     t, prim = hits.t.take(lane), hits.prim.take(lane)
     nearer = np.flatnonzero((found.t < t) | ((found.t == t) & (found.prim < prim) & (found.prim >= 0)))
-    nearer = nearer.take(np.lexsort((found.prim.take(nearer), found.t.take(nearer), lane.take(nearer))))
+    if (lane[1:] <= lane[:-1]).any():  # else each lane occurs once
+        nearer = nearer.take(np.lexsort((found.prim.take(nearer), found.t.take(nearer), lane.take(nearer))))
+        ordered = lane.take(nearer)
+        nearer = nearer.compress(np.append(True, ordered[1:] != ordered[:-1])[: ordered.size])
     lane = lane.take(nearer)
-    first = np.flatnonzero(np.append(True, lane[1:] != lane[:-1])[: lane.size])
-    lane, nearer = lane.take(first), nearer.take(first)
     hits.t[lane], hits.prim[lane] = found.t.take(nearer), found.prim.take(nearer)
     hits.b1[lane], hits.b2[lane] = found.b1.take(nearer), found.b2.take(nearer)

@@ -32,7 +32,8 @@ class MovingLights(LightRecord):
     number: Ints  # (k,) of their motions
     motions: Motions
     kind: type  # of `lights`
-    time: Doubles | None = field(default=None, kw_only=True)  # (n,) of the points that are lit
+    # (12, n) from the scene to the lights when points are lit; None where the times are not known
+    matrix: Doubles | None = field(default=None, kw_only=True)
 
     takes_receiver: ClassVar[bool] = True
     varies: ClassVar[bool] = True  # which side of a surface shines depends on the time
@@ -55,16 +56,16 @@ class MovingLights(LightRecord):
     def lighting(self, receiver: Receiver) -> Self:
         """Return the lights at the times of surfaces, and as they are sampled for these."""
         assert receiver.time is not None
-        found = replace(self, time=receiver.time)
+        matrix = self._matrix(receiver.time, receiver.time.size)
+        found = replace(self, matrix=matrix)
         if self.lights.takes_receiver:
-            matrix = found._matrix(receiver.time)
             normal = normalize(turned(matrix, receiver.normal)).astype(f4)
             found.lights = self.lights.lighting(Receiver(normal, receiver.opaque, time=receiver.time))
         return found
 
     def sample_li(self, point: Floats, u: Floats) -> LightSample:
         """Sample the lights as they see the points (3, n)."""
-        matrix = self._matrix(self.time, point.shape[1])
+        matrix = self._matrix(None, point.shape[1])
         sample = self.lights.sample_li(applied(matrix, point).astype(f4), u)
         return replace(
             sample,
@@ -74,7 +75,7 @@ class MovingLights(LightRecord):
 
     def pdf_li(self, point: Floats, wi: Floats) -> Floats:
         """Return the density of `sample_li`, (n,)."""
-        matrix = self._matrix(self.time, point.shape[1])
+        matrix = self._matrix(None, point.shape[1])
         toward = normalize(turned(matrix, wi)).astype(f4)
         density: Floats = self.lights.pdf_li(applied(matrix, point).astype(f4), toward)
         return density
@@ -114,8 +115,10 @@ class MovingLights(LightRecord):
         middle = moved_back(matrix, found.middle)
         return Emitters(middle, np.zeros_like(middle), found.extent2 / _scale(matrix) ** 2)
 
-    def _matrix(self, time: Doubles | None, n: int = 1) -> Doubles:
-        """Return the matrices (12, n) from the scene to the lights at times (n,)."""
+    def _matrix(self, time: Doubles | None, n: int) -> Doubles:
+        """Return the matrices (12, n) from the scene to the lights, those that are known or at times (n,)."""
+        if time is None and self.matrix is not None:
+            return self.matrix
         when = np.full(n, self.motions.middle) if time is None else time
         return self.motions.at(np.broadcast_to(self.number, when.shape), when)
 
