@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from gltf_builder import TRIANGLE, Builder
 from significance import render
 
 import wavefront as wf
@@ -248,3 +249,64 @@ def test_mistakes_are_named():
         flows(wf.Scene([wf.Sphere((0, 0, 0), 1), flat], camera=VIEW.resized(4)).at(1))
     with pytest.raises(AttributeError, match=r"no layer 'flow'; render it with aovs=\('flow',\)"):
         _ = render(scene, 1).flow
+
+
+def test_flow_of_a_skinned_mesh_of_a_file(tmp_path):
+    """A triangle on two joints: corners go by the mean of the joints' matrices, points between them along."""
+    build = Builder()
+    build.json["nodes"] = [{"mesh": 0, "skin": 0}, {"children": [2]}, {"translation": [0, 1, 0]}]
+    build.json["scenes"][0]["nodes"] = [0, 1]
+    inverse = np.tile(np.eye(4), (2, 1, 1))
+    inverse[1, 1, 3] = -1
+    columns = build.accessor(inverse.transpose(0, 2, 1).reshape(2, 16).astype(np.float32))
+    build.json["skins"] = [{"joints": [1, 2], "inverseBindMatrices": columns}]
+    weights = np.array([[1, 0, 0, 0], [0.5, 0.5, 0, 0], [0.25, 0.75, 0, 0]], np.float32)
+    joints = np.tile(np.uint8([0, 1, 0, 0]), (3, 1))
+    build.mesh({"POSITION": TRIANGLE, "JOINTS_0": joints, "WEIGHTS_0": weights})
+    half = float(np.sqrt(0.5))
+    keys = {"input": build.accessor(np.array([0, 1], np.float32)), "interpolation": "LINEAR"}
+    turns = build.accessor(np.array([[0, 0, 0, 1], [0, 0, half, half]], np.float32))
+    build.json["animations"] = [
+        {
+            "samplers": [{**keys, "output": turns}],
+            "channels": [{"sampler": 0, "target": {"node": 2, "path": "rotation"}}],
+        }
+    ]
+    camera = wf.Camera.look_at((0.3, 0.5, 4), (0.3, 0.5, 0), size=(48, 36)).transformed(PAN)
+    scene = wf.load(build.gltf(tmp_path / "arm.gltf"))
+    image = flows(scene.at(START), camera=camera.at(START))
+
+    def corners(time):
+        """The corners (4, 3), as columns, at a time."""
+        second = placed((0, 1, 0), 0) @ placed(degrees=-90 * time, axis=2) @ placed((0, -1, 0))
+        mixed = [first * np.eye(4) + other * second for first, other in weights[:, :2].astype(float)]
+        return np.stack([matrix @ [*corner, 1] for matrix, corner in zip(mixed, TRIANGLE, strict=True)], 1)
+
+    # on its plane, points go as an affine map that takes corner to corner
+    beside = np.array([[0.0], [0], [1], [0]])
+    maps = {time: np.hstack([corners(time), beside]) for time in (START, BEFORE, AFTER)}
+    assert np.abs(scene.at(AFTER).shapes[0].vertices.T - corners(AFTER)[:3]).max() < 1e-6
+    assert_flow(image, camera, lambda time: maps[time])
+
+
+def test_flow_of_a_mesh_that_melts_with_many_faces_is_that_of_its_corners():
+    """Where no affine map describes it: by the corners of the triangle that holds the point."""
+    vertices, faces = ball(7)
+    forms = np.stack(
+        [vertices, vertices + 0.2 * np.sin(5 * vertices[:, [1, 2, 0]]), vertices * (1, 0.5, 1.2)]
+    )
+    mesh, camera = wf.Mesh(forms, faces, times=KEYS), VIEW.transformed(PAN)
+    image = flows(wf.Scene([mesh], camera=camera).at(START))
+    seen = image.shape_id == 0
+    point = image.position[seen].astype(float)
+    a, b, c = mesh.at(START).vertices[faces].transpose(1, 0, 2)
+    frame = np.stack([b - a, c - a, np.cross(b - a, c - a)], -1)
+    local = np.linalg.solve(frame[None], (point[:, None] - a)[..., None])[..., 0]
+    outside = np.maximum(-local[..., :2].min(2), local[..., :2].sum(2) - 1)
+    outside = np.maximum(outside, 0) + np.abs(local[..., 2])
+    face = outside.argmin(1)
+    u, v, _ = local[np.arange(len(face)), face].T[..., None]
+    d, e, f = mesh.at(AFTER).vertices[faces[face]].transpose(1, 0, 2)
+    there = d + (e - d) * u + (f - d) * v
+    found = centers(image)[seen] + image.flow[seen]
+    assert np.abs(camera.at(AFTER).project(there)[0] - found).max() < 1e-3

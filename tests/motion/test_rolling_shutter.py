@@ -176,6 +176,20 @@ def test_a_session_follows_cameras_that_move_in_other_ways():
         assert np.array_equal(session.run().rgb, wf.render(scene, **options).rgb)
 
 
+def test_turned_cameras_keep_their_way():
+    """An orbit turns the way too; cameras between others stay where they are."""
+    moving = VIEW.transformed(way(1, 0, 0))
+    for degrees in (0, 90):
+        turned = wf.orbit(moving, (0, 0, 0), degrees)
+        for time in (0, 0.5, 1):
+            due = wf.orbit(moving.at(time), (0, 0, 0), degrees)
+            assert turned.at(time).origin == pytest.approx(due.origin)
+            assert turned.at(time).rotation == pytest.approx(due.rotation)
+    between = wf.interpolate_cameras([moving, VIEW.replace(origin=(5, 2, 6))], 3)[1]
+    assert not between.moves
+    assert between.origin == pytest.approx((2.5, 2, 6))
+
+
 def test_mistakes_are_named():
     rolling = VIEW.replace(rolling_shutter=READ)
     scene = wf.Scene([wf.Box((0, 0, 0), 1).transformed(way(1, 0, 0))], [wf.PointLight((0, 4, 4), 9)], rolling)

@@ -45,6 +45,10 @@ def orbit(camera: Camera, center: ArrayLike, degrees: float, up: ArrayLike = "y"
         raise SceneError("camera is None; it must be a wf.Camera")
     middle = finite_array("center", center, (3,))
     turn = _rotation(upward("up", up), np.radians(number("degrees", degrees)))
+    if camera.moves:
+        around = np.eye(4)
+        around[:3, :3], around[:3, 3] = turn, middle - turn @ middle
+        return camera.transformed(around)
     return _placed(camera, middle + turn @ (camera.origin - middle), turn @ camera.rotation)
 
 
@@ -105,9 +109,11 @@ def interpolate_cameras(cameras: Sequence[Camera], n: int) -> list[Camera]:
 
 
 def _placed(camera: Camera, origin: Doubles, rotation: Doubles) -> Camera:
-    """Return a camera at another place, with the same projection, size and window."""
+    """Return a still camera at another place, with the same projection, size and window."""
     moved = copy(camera)
     moved.origin, moved.rotation = origin, rotation
+    for name in ("motion", "course"):
+        vars(moved).pop(name, None)
     return moved
 
 

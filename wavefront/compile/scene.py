@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
+from copy import copy
 from dataclasses import field, replace
 from typing import Any
 
@@ -108,7 +109,11 @@ class CompiledScene:
             If it is so far away that float32 cannot measure its distance.
         """
         check_distance("Camera origin", camera.origin, self.center / self.scale, self.scale)
-        return camera.scaled(self.scale)
+        view = camera.scaled(self.scale)
+        if view.course is not None:  # paths of a moment need no more than its place
+            view = copy(view)
+            del view.course
+        return view
 
     def seen_by(self, camera: Camera) -> CompiledScene:
         """Return the scene as the first rays of a camera meet it: sensors measure the light that is there."""
