@@ -10,7 +10,7 @@ from ..core.errors import SceneError, finite_array
 from ..core.plural import plural
 from ..core.suggestions import suggests_keywords
 from .motion import Motion
-from .quaternions import determinants, polar, quaternions_of, rotation_of, times
+from .quaternions import determinants, polar, quaternions_of, rotation_of
 from .track import Track
 
 SINGULAR = 1e-12  # least scale of a matrix along an axis, relative to the greatest
@@ -68,13 +68,21 @@ class Trs(Motion):
 
 def composed(translation: Doubles, rotation: Doubles, scale: Doubles) -> Doubles:
     """Return matrices (n, 4, 4): translation (n, 3) · quaternion (n, 4) · scale (n, 3) or (n, 3, 3)."""
-    matrix = np.zeros((len(translation), 4, 4))
-    linear = rotation_of(rotation)
+    matrix = np.empty((len(translation), 4, 4))
+    turn = np.ascontiguousarray(rotation_of(rotation).transpose(1, 2, 0))
+    factors = np.ascontiguousarray(np.moveaxis(scale, 0, -1))
     with np.errstate(over="ignore", invalid="ignore"):
-        matrix[:, :3, :3] = linear * scale[:, None] if scale.ndim == 2 else times(linear, scale)
+        for i in range(3):  # element by element, each contiguous over the matrices
+            for j in range(3):
+                matrix[:, i, j] = turn[i, j] * factors[j] if scale.ndim == 2 else _row(turn[i], factors[:, j])
     matrix[:, :3, 3] = translation
-    matrix[:, 3, 3] = 1
+    matrix[:, 3] = 0, 0, 0, 1
     return matrix
+
+
+def _row(a: Doubles, b: Doubles) -> Doubles:
+    """Return the sums (n,) of products of rows (3, n), in order."""
+    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 
 
 class Keyframes(Trs):

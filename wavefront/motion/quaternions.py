@@ -54,15 +54,24 @@ def quaternions_of(rotations: Doubles) -> Doubles:
 
 def slerp(a: Doubles, b: Doubles, part: Doubles) -> Doubles:
     """Return the quaternions (n, 4) between unit ones, the shorter way, at parts (n, 1) in [0, 1]."""
-    x, y, z, w = (a * b).T
-    b = np.where((x + y + z + w)[:, None] < 0, -b, b)
-    angle = 2 * arctan2(_length(a - b), _length(a + b))
+    p, q, t = a.T.copy(), b.T.copy(), part[:, 0]  # contiguous over the quaternions
+    x, y, z, w = p * q
+    q *= np.where(x + y + z + w < 0, -1.0, 1.0)
+    angle = 2 * arctan2(_norm(p - q), _norm(p + q))
     sine = sin_cos(angle)[0]
     apart = sine > PARALLEL
     safe = np.where(apart, sine, 1)
-    first = np.where(apart, sin_cos((1 - part) * angle)[0] / safe, 1 - part)
-    second = np.where(apart, sin_cos(part * angle)[0] / safe, part)
-    return normalized(first * a + second * b)
+    first = np.where(apart, sin_cos((1 - t) * angle)[0] / safe, 1 - t)
+    second = np.where(apart, sin_cos(t * angle)[0] / safe, t)
+    between = first * p + second * q
+    return np.ascontiguousarray((between / _norm(between)).T)
+
+
+def _norm(rows: Doubles) -> Doubles:
+    """Return the lengths (n,) of quaternions (4, n)."""
+    x, y, z, w = rows
+    out: Doubles = np.sqrt(x * x + y * y + z * z + w * w)
+    return out
 
 
 def normalized(quaternions: Doubles) -> Doubles:
@@ -121,6 +130,4 @@ def _squares(matrices: Doubles) -> Doubles:
 
 def _length(rows: Doubles) -> Doubles:
     """Return the lengths (n, 1) of rows (n, 4)."""
-    x, y, z, w = rows.T
-    out: Doubles = np.sqrt(x * x + y * y + z * z + w * w)[:, None]
-    return out
+    return _norm(rows.T)[:, None]

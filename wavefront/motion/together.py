@@ -41,6 +41,8 @@ class Together:
                 self._fixed[row] = part
         self._trs = _grouped([(row, self._parts[row]) for row in trs])  # type: ignore[misc]
         self._levels = _levels(self._pairs)
+        once = np.array_equal(self._wanted, np.arange(len(self._parts)))
+        self._uniform = once and len(self._trs) == 1 and len(trs) == len(motions)
 
     def _add(self, motion: Motion | Doubles) -> None:
         """Note a motion and the motions that it is a product of, without recursion into long chains."""
@@ -61,6 +63,8 @@ class Together:
 
     def at(self, time: float) -> Doubles:
         """Return the matrices (n, 4, 4) at a time."""
+        if self._uniform:
+            return composed(*(each.at(time) for each in self._trs[0][1]))
         out = self._fixed.copy()
         for rows, bundles in self._trs:
             out[rows] = composed(*(each.at(time) for each in bundles))

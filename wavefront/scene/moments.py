@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from ..arrays.vec import Bools, Doubles
-from ..motion import Together
+from ..motion import Keyframes, Together
 from ..motion.quaternions import determinants
 from ..shapes import Instance, Shape
 from ..shapes.instance import placed_together
@@ -34,6 +34,7 @@ class Moments:
         self.carried = [number for number in placed if shapes[number].motion is not None]
         known = set(self.carried)
         self.others = [number for number in moving if number not in known]
+        self._may_flatten = any(type(shapes[number].motion) is not Keyframes for number in self.carried)
         self._motions = Together([shapes[number].motion for number in self.carried])  # type: ignore[misc]
         self.spans = {shapes[number].time_span for number in moving}
 
@@ -61,7 +62,8 @@ class Moments:
         instances = [shapes[number] for number in self.carried]
         for number, instance in zip(self.carried, placed_together(instances, matrices, forms), strict=True):
             shapes[number] = instance
-        for at in np.flatnonzero(_flattens(matrices)).tolist():
+        flat = np.flatnonzero(_flattens(matrices)) if self._may_flatten else ()
+        for at in map(int, flat):
             shapes[self.carried[at]] = shapes[self.carried[at]].to_mesh().with_area()
         return [shape for shape in shapes if shape is not None]
 

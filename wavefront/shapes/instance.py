@@ -242,16 +242,17 @@ def placed_together(
     forms
         By the ids of their meshes, others in their place.
     """
-    out = []
     with unwatched():
-        for old, matrix in zip(instances, matrices, strict=True):
-            instance, values = object.__new__(type(old)), vars(old).copy()
+        out: list[I] = list(
+            map(object.__new__, map(type, instances))
+        )  # a loop over calls would take twice as long
+        states = map(dict.copy, map(vars, instances))
+        for instance, values, matrix in zip(out, states, matrices, strict=True):
             values["transform"] = matrix
             values.pop("motion", None)
             if forms:
-                values["mesh"] = forms.get(id(old.mesh), old.mesh)
+                values["mesh"] = forms.get(id(values["mesh"]), values["mesh"])
             instance.__dict__ = values
-            out.append(instance)
     return out
 
 
