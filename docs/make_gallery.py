@@ -4,7 +4,7 @@ python docs/make_gallery.py [name ...]
 
 Each picture is what `python examples/NAME.py --size SIZE --spp SPP` renders, as a jpg, denoised where the
 table says so. A card is the middle of it, 480 by 320 pixels. It needs pyoidn, and minutes for each picture.
-The name `tutorial` stands for the pictures on the tutorial's start page.
+The name `tutorial` stands for the pictures on the tutorial's start page, and `figures` for those of a course.
 """
 
 from __future__ import annotations
@@ -42,7 +42,7 @@ PICTURES = {  # size, samples per pixel, whether it is denoised, whether it has 
     "environment": (1200, 64, True, True),
     "own_material": (1200, 64, True, True),
     "material_sheet": (1200, 40, True, False),
-    "skies": (280, 24, True, False),
+    "skies": (400, 24, True, False),
     "office": (480, 32, True, False),
     "layers": (297, 64, False, False),
     "estimators": (300, 32, False, False),
@@ -84,6 +84,18 @@ def make_tutorial() -> None:
         pair.save(DOCS / "tutorial" / "pictures" / f"{script.stem}.jpg", quality=QUALITY, optimize=True)
 
 
+def make_figures() -> None:
+    """Make the figures of a course."""
+    script = str(ROOT / "examples" / "course_figures.py")
+    for name in runpy.run_path(script)["FIGURES"]:
+        with tempfile.TemporaryDirectory() as folder:
+            output = Path(folder) / "figure.png"
+            sys.argv = [script, str(output), "--figure", name]
+            runpy.run_path(script, run_name="__main__")
+            picture = Pillow.open(output).convert("RGB")
+        picture.save(DOCS / "figures" / f"{name}.jpg", quality=QUALITY, optimize=True, progressive=True)
+
+
 def middle(picture: Pillow.Image) -> Pillow.Image:
     """Return the largest part in the middle of a picture that has the shape of a card."""
     width, height = picture.size
@@ -95,5 +107,7 @@ def middle(picture: Pillow.Image) -> Pillow.Image:
 if __name__ == "__main__":
     sys.path[:0] = [str(ROOT / "examples"), str(DOCS / "tutorial")]  # some use parts of others
     (DOCS / "cards").mkdir(exist_ok=True)
-    for name in sys.argv[1:] or [*PICTURES, "tutorial"]:
-        make_tutorial() if name == "tutorial" else make(name)
+    (DOCS / "figures").mkdir(exist_ok=True)
+    special = {"tutorial": make_tutorial, "figures": make_figures}
+    for name in sys.argv[1:] or [*PICTURES, *special]:
+        special[name]() if name in special else make(name)

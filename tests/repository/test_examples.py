@@ -20,6 +20,7 @@ SHAPES = {  # the picture of --size 24, (height, width)
     "cloud": (18, 24),
     "cornell_box": (24, 24),
     "cradle": (16, 16, 24),
+    "course_figures": (640, 1200),
     "course_spheres": (24, 24),
     "cuboids": (16, 24),
     "default_look": (20, 24),
@@ -89,6 +90,13 @@ def test_example_writes_a_picture(name, run):
     assert picture.shape == (*SHAPES[name], 3)
     assert picture.std() > 0.05
     assert 0.01 < picture.mean() < 0.9
+
+
+@pytest.mark.parametrize("figure", ["estimators", "bounces", "lobes", "samples", "roulette", "plates"])
+def test_figures_of_the_course(figure, run, recwarn):
+    _, picture = run("course_figures", "--spp", "4", "--size", "16", "--figure", figure)
+    assert picture.shape[1] >= 1000
+    assert picture.std() > 0.05
 
 
 @pytest.mark.parametrize("name", SHAPES)
