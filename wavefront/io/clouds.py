@@ -26,14 +26,3 @@ def cloud(losses: Losses, points: Table, colors: Any) -> Spheres | None:
     spheres = f"{plural(len(places), 'point')} become spheres of radius {radius:.3g}"
     losses.note("has no faces", done=f"{spheres} (wf.Points takes another)")
     return Points(places, radius, None if colors is None else colors[sound])
-
-
-def cloud_of_trimesh(losses: Losses, scene: Any) -> Spheres | None:
-    """Return a sphere at each point of the clouds of a trimesh scene; None if there is none."""
-    clouds = [each for each in scene.geometry.values() if type(each).__name__ == "PointCloud"]
-    if not clouds:
-        return None
-    points = np.concatenate([np.asarray(each.vertices, np.float64).reshape(-1, 3) for each in clouds])
-    colors = [np.asarray(each.colors) for each in clouds]
-    whole = sum(map(len, colors)) == len(points) and all(each.dtype == np.uint8 for each in colors)
-    return cloud(losses, points, np.concatenate(colors) if whole else None)

@@ -27,8 +27,6 @@ from .joining import join
 from .losses import Losses
 from .readers import LoadOptions, mesh_reader, read
 from .sources import LoadLimits, PathLike, SceneFiles, checked_limits, folders
-from .trimesh import objects as trimesh_objects
-from .trimesh import view as trimesh_view
 
 ALL_OF_THE_LIGHT = (".xml", ".pbrt", ".xml.gz", ".pbrt.gz")  # scenes of renderers, which show no other light
 
@@ -247,13 +245,15 @@ def from_trimesh(geometry: Any, *, smooth: bool | float | str = AUTO) -> Scene:
     array([[-0.5, -0.5, -0.5],
            [ 0.5,  0.5,  0.5]])
     """
+    from .trimesh import objects, view  # here, as programs that hold no such object need not pay for it
+
     source = "trimesh object"
     with Losses(source) as losses:
-        contents = trimesh_objects.read(geometry, source, losses)
+        contents = objects.read(geometry, source, losses)
         contents.smooth(check_smooth("smooth", smooth))
         scene = contents.scene(source, losses)
-        scene.lights = trimesh_view.lights(geometry, losses)
-        trimesh_view.add_camera(scene, geometry)
+        scene.lights = view.lights(geometry, losses)
+        view.add_camera(scene, geometry)
         scene.losses = losses.found
         return scene
 

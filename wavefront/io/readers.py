@@ -1,4 +1,4 @@
-"""The file formats, and the reader of each."""
+"""The file formats, and the reader of each, whose modules are imported with its first file."""
 
 from __future__ import annotations
 
@@ -13,16 +13,10 @@ from ..core.files import decode_text, extension_of
 from ..core.registry import Registry
 from ..scene import Scene
 from ..shapes.smoothing import AUTO
-from . import mtl, obj, off, stl, threemf
 from .clouds import cloud
-from .dae import document as dae
 from .description.appearance import assign_material, from_srgb
 from .description.contents import Contents
-from .gltf import scene as gltf
-from .gltf.materials import GltfMaterials
 from .losses import Losses
-from .ply import meshes as ply
-from .ply.attributes import ply_attributes
 from .repair import RawMesh
 from .sources import LoadLimits, PathLike, SceneFiles
 
@@ -76,6 +70,9 @@ def _refuse(name: str, data: bytes) -> None:
 
 
 def _read_gltf(files: SceneFiles, data: bytes, options: LoadOptions) -> Contents:
+    from .gltf import scene as gltf
+    from .gltf.materials import GltfMaterials
+
     document = gltf.Document(files, data)
     with document.inside("the file"):
         contents, numbers = gltf.contents(document, options.animation)
@@ -87,6 +84,8 @@ def _read_gltf(files: SceneFiles, data: bytes, options: LoadOptions) -> Contents
 
 
 def _read_obj(files: SceneFiles, data: bytes, options: LoadOptions) -> Contents:
+    from . import mtl, obj
+
     losses, materials = files.losses, options.materials
     parsed = obj.parse(losses, decode_text(data), options.limits)
     for keyword, line in parsed.ignored.items():
@@ -109,30 +108,40 @@ def _read_obj(files: SceneFiles, data: bytes, options: LoadOptions) -> Contents:
 
 
 def _read_ply(files: SceneFiles, data: bytes, options: LoadOptions) -> Contents:
+    from .ply import meshes as ply
+
     return ply.parse(files, data, options.materials).contents
 
 
 def _read_stl(files: SceneFiles, data: bytes, options: LoadOptions) -> Contents:
+    from . import stl
+
     contents = Contents.once(stl.parse(files.losses, data))
     contents.up = "z"
     return contents
 
 
 def _read_off(files: SceneFiles, data: bytes, options: LoadOptions) -> Contents:
+    from . import off
+
     raws = off.parse(files.losses, data, options.materials)
     return Contents.once([raw for raw in raws if len(raw.faces)])
 
 
 def _read_dae(files: SceneFiles, data: bytes, options: LoadOptions) -> Contents:
+    from .dae import document as dae
+
     return dae.parse(files, data, options.materials)
 
 
 def _read_3mf(files: SceneFiles, data: bytes, options: LoadOptions) -> Contents:
+    from . import threemf
+
     return threemf.parse(files, data, options.materials)
 
 
 def _read_mitsuba(files: SceneFiles, data: bytes, options: LoadOptions) -> Contents:
-    from .mitsuba.convert import convert  # here, as programs that read no such scene need not pay for it
+    from .mitsuba.convert import convert
     from .mitsuba.document import Document
 
     document = Document(files, data, options.parameters)
@@ -140,13 +149,13 @@ def _read_mitsuba(files: SceneFiles, data: bytes, options: LoadOptions) -> Conte
 
 
 def _read_usd(files: SceneFiles, data: bytes, options: LoadOptions) -> Contents:
-    from .usd.stage import read_usd  # here, as programs that read no such scene need not pay for it
+    from .usd.stage import read_usd
 
     return read_usd(files, options.time)
 
 
 def _read_pbrt(files: SceneFiles, data: bytes, options: LoadOptions) -> Contents:
-    from .pbrt.scene import read_scene  # here, as programs that read no such scene need not pay for it
+    from .pbrt.scene import read_scene
 
     return read_scene(files, data, mesh_reader(files))
 
@@ -163,6 +172,9 @@ def mesh_reader(files: SceneFiles) -> Callable[[Path], list[RawMesh]]:
         _refuse(name, data)
         if kind == ".obj":
             return _read_obj(own, data, LoadOptions(files.losses, materials=False, limits=files.limits)).raws
+        from .ply import meshes as ply
+        from .ply.attributes import ply_attributes
+
         parsed = ply.parse(own, data, materials=False)
         raws = parsed.contents.raws
         for raw in raws:
