@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 from strategies import rotations, seeds
 
@@ -14,6 +14,7 @@ from wavefront.motion.track import CUBIC, LINEAR, STEP, Track
 from wavefront.motion.turn import Turn
 
 EPS = np.finfo(np.float64).eps
+some = settings(max_examples=settings.default.max_examples // 4)
 CLOSE = 64 * EPS  # some tens of roundings
 
 
@@ -36,6 +37,7 @@ def turned(axis, degrees):
     return wf.shapes.transform.rotation("x", axis, degrees, (0, 0, 0))[:3, :3]
 
 
+@some
 @given(affine())
 def test_polar_parts_multiply_to_the_matrix(m):
     rotation, stretch = polar(m[None, :3, :3])
@@ -69,6 +71,7 @@ def test_slerp_turns_evenly_the_shorter_way(a, b, part):
     np.testing.assert_array_equal(slerp(qa, -qb, np.array([[part]])), slerp(qa, qb, np.array([[part]])))
 
 
+@some
 @given(affine(1), affine(1), affine(1))
 def test_keys_are_met_and_ends_hold(a, b, c):
     motion = wf.Keyframes([1, 2, 4], [a, b, c])
@@ -78,6 +81,7 @@ def test_keys_are_met_and_ends_hold(a, b, c):
     assert (motion.start, motion.end) == (1, 4)
 
 
+@some
 @given(affine(), affine(), st.floats(0, 3))
 def test_one_time_has_the_bits_of_many(a, b, time):
     sign = np.sign(np.linalg.det(a[:3, :3]) * np.linalg.det(b[:3, :3]))
@@ -86,6 +90,7 @@ def test_one_time_has_the_bits_of_many(a, b, time):
     np.testing.assert_array_equal(many[1], motion.at(time))
 
 
+@some
 @given(st.lists(affine(1), min_size=2, max_size=5), st.floats(-1, 4))
 def test_many_motions_have_the_bits_of_each(matrices, time):
     keys = [wf.Keyframes([0, 1 + k, 2 + k], [m, matrices[0], m]) for k, m in enumerate(matrices)]

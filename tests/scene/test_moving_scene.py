@@ -1,5 +1,6 @@
 """Scenes in which something moves: each of their times is a still scene."""
 
+import gc
 import time
 from copy import deepcopy
 
@@ -189,11 +190,59 @@ def test_cameras_move():
     ):
         np.testing.assert_allclose(other.at(1).origin, camera.at(1).origin)
     assert not camera.replace(origin=(0, 0, 1)).moves
+    given = {"K": [[40, 0, 20], [0, 40, 15], [0, 0, 1]], "size": (40, 30)}
+    outside = wf.Keyframes(
+        [0, 1], [wf.Camera.look_at(eye, (0, 0, 0)).extrinsics() for eye in ((0, 0, 4), (1, 2, 3))]
+    )
+    calibrated = wf.Camera.from_intrinsics(R=outside, **given)
+    for at in (0, 0.5, 1):
+        np.testing.assert_allclose(calibrated.at(at).extrinsics(), outside.at(at), atol=1e-9)
+    np.testing.assert_allclose(calibrated.extrinsics(), outside.at(0), atol=1e-12)
     dolly = wf.Camera.look_at((0, 0, 4), (0, 0, 0)).transformed(SLIDE)
     np.testing.assert_allclose(dolly.at(2).origin, (4, 0, 4))
     np.testing.assert_allclose(dolly.transformed(moved(0, 1)).at(2).origin, (4, 1, 4))
     with pytest.raises(wf.SceneError, match=r"cam_to_world.*must be a rotation"):
         wf.Camera.from_matrix(wf.Keyframes([0], [np.diag([2, 2, 2, 1])]))
+
+
+@pytest.mark.parametrize(
+    ("make", "message"),
+    [
+        (
+            lambda: wf.Camera.look_at((0, 0, 4), (0, 0, 0)).transformed(np.zeros((4, 4))),
+            r"Camera transform takes the view to \[0.0, 0.0, 0.0\]; it must not be zero",
+        ),
+        (
+            lambda: wf.Camera.look_at((0, 0, 4), (0, 0, 0)).transformed(np.eye(3)),
+            r"Camera transform must have shape",
+        ),
+        (
+            lambda: wf.PointLight((0, 0, 0), 1).transformed(2 * np.eye(4)),
+            "PointLight transform has the last row",
+        ),
+        (lambda: triangle().transformed(np.eye(3)), "mesh: transform matrix must have shape"),
+        (lambda: triangle().transformed(SLIDE).transformed(2 * np.eye(4)), "has the last row"),
+        (lambda: wf.Instance(triangle(), [SLIDE]), "transform must"),
+        (lambda: wf.Instance.many(triangle(), [SLIDE, np.eye(4)]), "transforms must"),
+        (lambda: wf.Group([triangle()]).placed([SLIDE, 3]), "Group transforms must"),
+        (
+            lambda: wf.Sphere((0, 0, 0), 1).transformed(wf.Keyframes([0], [np.diag([1, 2, 1, 1])])),
+            "stretches by 1 along one axis and 2 along another",
+        ),
+    ],
+)
+def test_transforms_that_cannot_be(make, message):
+    with pytest.raises(wf.SceneError, match=message):
+        make()
+
+
+def test_the_garbage_collector_is_left_as_it_was():
+    was = gc.isenabled()
+    for enabled in (True, False):
+        (gc.enable if enabled else gc.disable)()
+        wf.Instance.many(triangle(), [np.eye(4)] * 3)
+        assert gc.isenabled() is enabled
+    (gc.enable if was else gc.disable)()
 
 
 def ies(tmp_path):

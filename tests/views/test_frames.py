@@ -352,3 +352,8 @@ def test_commands_render_a_moment(tmp_path: Path) -> None:
     found = wf.Image.load(out).rgb
     due = wf.render(wf.load(path, time=0.5), 1, size=(16, 12), lighting="even", **QUIET)
     np.testing.assert_array_equal(found, due.rgb)
+
+
+def test_info_says_what_moves(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["info", str(animated(tmp_path / "a.gltf"))]) == 0
+    assert "\nmoves: from 0 to 1 s; animations '0', 'Go'\n" in capsys.readouterr().out

@@ -24,7 +24,7 @@ from ..core.errors import (
 )
 from ..core.parameter import brief
 from ..core.suggestions import Answers, suggests_keywords
-from ..motion import Motion, Moving, product
+from ..motion import Inverse, Motion, Moving, Product, product
 from ..sampling.tiles import PictureTiles, Tiles
 from .distortion import Distortion
 from .fisheye import Fisheye
@@ -215,7 +215,7 @@ class Camera(Moving, Answers):
     def from_intrinsics(
         cls,
         K: ArrayLike,
-        R: ArrayLike,
+        R: ArrayLike | Motion,
         t: ArrayLike | None = None,
         size: ImageSize | None = None,
         *,
@@ -235,7 +235,7 @@ class Camera(Moving, Answers):
             (3, 3) intrinsics [[fx, s, cx], [0, fy, cy], [0, 0, 1]] in pixels.
         R, t
             Rotation (3, 3) and translation, (3,) or (3, 1), from world to camera space; or `R` alone as one
-            matrix (4, 4) or (3, 4) of both, the extrinsics.
+            matrix (4, 4) or (3, 4) of both, the extrinsics; or a motion of such matrices, as `Keyframes`.
         size
             (width, height) in pixels; it must be given.
         distortion
@@ -258,7 +258,7 @@ class Camera(Moving, Answers):
             raise SceneError("from_intrinsics needs size=(width, height), that of the calibrated pictures")
         height = image_size(size)[1]
         fy, parts = _calibration(K, image_size(size), pixel_centers)
-        axes, shift = _extrinsics(R, t)
+        axes, shift = _extrinsics(R.at(R.start) if isinstance(R, Motion) else R, t)
         lens = Perspective(
             2 * float(np.degrees(arctan2(np.float64(height / 2), np.float64(fy)))),
             aperture=aperture,
@@ -266,7 +266,10 @@ class Camera(Moving, Answers):
             distortion=None if distortion is None else Distortion(distortion),
             **parts,
         )
-        return cls(-axes.T @ shift, axes.T * (1, -1, -1), lens, size, crop)
+        camera = cls(-axes.T @ shift, axes.T * (1, -1, -1), lens, size, crop)
+        if isinstance(R, Motion):
+            camera.motion = Product(Inverse(R), np.diag([1.0, -1, -1, 1]))
+        return camera
 
     @classmethod
     @suggests_keywords

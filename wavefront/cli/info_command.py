@@ -89,6 +89,9 @@ def _lines(path: str, scene: Scene) -> Iterator[str]:
     yield f"bounds: {_triple(low)} to {_triple(high)}, {_triple(high - low)} across"
     camera, lit = scene.camera is not None, scene.emits
     yield f"up: {_axis(path, scene)}"
+    if scene.moves:
+        named = f"; animations {', '.join(map(repr, scene.animations))}" if scene.animations else ""
+        yield f"moves: from {scene.start:g} to {scene.end:g} s{named}"
     yield f"camera: {'in the file' if camera else f'none; render frames the scene, view={FRAMING_VIEW!r}'}"
     if scene.settings:
         told = (f"{name} {value}" for name, value in scene.settings.items())

@@ -4,11 +4,12 @@ from .deformation import Deformation, Samples
 from .keyframes import Keyframes
 from .motion import Motion
 from .moving import Moving
-from .product import Product, Still, product
+from .product import Inverse, Product, Still, product
 from .together import Together
 
 __all__ = [
     "Deformation",
+    "Inverse",
     "Keyframes",
     "Motion",
     "Moving",

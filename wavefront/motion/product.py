@@ -33,6 +33,23 @@ class Product(Motion):
         return np.broadcast_to(matrix_times(first, second), (len(times), 4, 4))
 
 
+class Inverse(Motion):
+    """A motion the other way: at each time the inverse matrix, as of a camera by its extrinsics.
+
+    Parameters
+    ----------
+    motion
+        Whose matrices can be inverted.
+    """
+
+    def __init__(self, motion: Motion) -> None:
+        self._motion, self.start, self.end = motion, motion.start, motion.end
+
+    def at_times(self, times: Doubles) -> Doubles:
+        """Return the matrices (n, 4, 4) at times (n,)."""
+        return np.asarray(np.linalg.inv(self._motion.at_times(times)), np.float64)
+
+
 class Still(Motion):
     """A place that stays, for as long as what is placed there deforms.
 
