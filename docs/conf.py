@@ -88,19 +88,21 @@ def links_to_the_tutorial(app, docname, source):
 
 
 def contents_from_lists(app, docname, source):
-    """Give each section of the index a table of contents: the pages that its list links to."""
+    """Give the start page a table of contents for each section of pages.md: the pages of its list."""
     if docname != root_doc:
         return
     text = source[0]
-    for section in re.split(r"^## ", text, flags=re.MULTILINE)[1:]:
+    lists = (ROOT / "docs" / "pages.md").read_text("utf-8")
+    lists = TUTORIAL.sub(r"](\1generated/tutorial/index.rst)", lists)
+    for section in re.split(r"^## ", lists, flags=re.MULTILINE)[1:]:
         caption = section.partition("\n")[0]
         pages = "\n".join(dict.fromkeys(_page_of(link) for link in LINKED.findall(section)))
         text += TOCTREE.format(caption=caption, pages=pages)
-    source[0] = text
+    source[0] = text + TOCTREE.format(caption="All", pages="/docs/pages")
 
 
 def _page_of(link: str) -> str:
-    """Return the name of the page, from the root of the site, to which a link of the index leads."""
+    """Return the name of the page, from the root of the site, to which a link of pages.md leads."""
     path = (ROOT / "docs" / link).resolve().relative_to(ROOT)
     return f"/{path.with_suffix('').as_posix()}"
 

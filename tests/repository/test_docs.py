@@ -180,10 +180,22 @@ def test_files_named_in_the_documents_exist():
             assert found or document.parent.name == "record", f"{document.name}: {name}"
 
 
-def test_the_index_lists_every_document():
-    pages = {path for path, _ in LINK.findall((ROOT / "docs" / "index.md").read_text("utf-8"))}
+def test_the_list_of_pages_has_every_document():
+    pages = {path for path, _ in LINK.findall((ROOT / "docs" / "pages.md").read_text("utf-8"))}
     documents = {path.relative_to(ROOT / "docs").as_posix() for path in PAGES}
-    assert documents - pages == {"index.md"}
+    assert documents - pages == {"pages.md"}
+
+
+def test_the_start_page_has_pictures_that_lead_to_answers():
+    """And a first command whose lines are not cut off at the width of the site's column."""
+    text = (ROOT / "docs" / "index.md").read_text("utf-8")
+    cards = re.findall(r"\[!\[([^\]]+)\]\((cards/[^)]+)\)\]\(([^)]+)\)<br>\[([^\]]+)\]\(([^)]+)\)", text)
+    assert len(cards) == 12
+    assert all(link == again for _, _, link, _, again in cards)
+    commands = re.findall(r"^```sh\n(.*?)^```$", text, re.MULTILINE | re.DOTALL)
+    assert commands
+    assert max(len(line) for line in "".join(commands).splitlines()) <= 60
+    assert not re.search(r"^- ", text, re.MULTILINE)
 
 
 def test_the_packages_of_the_architecture_are_the_layers():
