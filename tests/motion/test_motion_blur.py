@@ -296,6 +296,30 @@ def test_times_of_a_pixel_are_stratified():
     assert sorted(np.floor(paths.time * 64)) == list(range(64))
 
 
+def test_shape_that_shrinks_to_nothing():
+    """It is seen for a part of the time that falls with the distance from the middle."""
+
+    class Shrink(wf.Motion):
+        start, end = 0.0, 1.0
+
+        def at_times(self, times):
+            scale = np.tile(np.eye(4), (len(times), 1, 1))
+            scale[:, :3, :3] *= (1 - np.clip(times, 0, 1))[:, None, None]
+            return scale
+
+    plate = wf.Rectangle((-4, -99, 0), (8, 0, 0), (0, 198, 0))
+    camera = wf.Camera.orthographic((0, 0, 5), (0, 0, 0), height=0.5, size=(16, 1))
+    image = render(
+        wf.Scene([plate.transformed(Shrink()), wf.Sphere((0, 9, 0), 0.1)], wf.Environment(1), camera),
+        4096,
+        shutter=(0, 1),
+        aovs="alpha",
+        **OPTIONS,
+    )
+    middle = np.abs((np.arange(16) - 7.5) / 2)
+    np.testing.assert_allclose(image.layers["alpha"].ravel(), 1 - middle / 4, atol=0.03)
+
+
 # --- With all else -----------------------------------------------------------------------------------
 
 

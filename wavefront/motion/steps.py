@@ -13,6 +13,7 @@ from ..arrays.vec import Doubles, Floats, Ints
 Matrices = Callable[[Doubles], Doubles]  # from times (n,) to matrices (n, 4, 4)
 
 ERROR = 2.0**-20  # of places, relative to the size of what is placed: what linear steps may leave out
+LEAST_SCALE = 1e-9  # of what a motion flattens, relative to its greatest
 MOST_STEPS = 1 << 12
 MOST_MATRICES = 1 << 17  # of all motions; many motions have fewer steps
 
@@ -44,17 +45,15 @@ class Motions:
         steps = 1
         while True:
             times = np.linspace(begin, end, 4 * steps + 1)
-            placed = np.stack([motion(times)[:, :3] for motion in motions])
-            if (
-                steps >= min(MOST_STEPS, MOST_MATRICES // len(motions))
-                or _error_of_steps(placed, reach) <= ERROR
-            ):
+            placed = np.stack([motion(times) for motion in motions])
+            placed[:, :, :3, :3] = _thickened(placed[:, :, :3, :3])
+            to_local = np.linalg.inv(placed)[:, :, :3]
+            enough = steps >= min(MOST_STEPS, MOST_MATRICES // len(motions))
+            if enough or _error_of_steps(placed[:, :, :3], to_local, reach) <= ERROR:
                 break
             steps *= 2
-        whole = np.zeros((len(motions), steps + 1, 4, 4))
-        whole[:, :, :3], whole[:, :, 3, 3] = placed[:, ::4], 1
-        inverse = np.linalg.inv(whole)[:, :, :3]
-        return cls(begin, end - begin, steps, np.ascontiguousarray(inverse.reshape(-1, 12).T))
+        table = np.ascontiguousarray(to_local[:, ::4].reshape(-1, 12).T)
+        return cls(begin, end - begin, steps, table)
 
     def at(self, number: Ints, time: Doubles) -> Doubles:
         """Return the (3, 4) matrices of some motions (n,) at times (n,), row by row, (12, n)."""
@@ -79,22 +78,31 @@ class Motions:
         return found
 
 
-def _error_of_steps(placed: Doubles, reach: Doubles) -> float:
+def _thickened(linear: Doubles) -> Doubles:
+    """Return linear parts (m, k, 3, 3) that can be inverted: what is flattened stays very thin."""
+    u, scales, v = np.linalg.svd(linear)
+    thin = np.maximum(scales, LEAST_SCALE * scales.max((1, 2), keepdims=True))
+    flat = (thin > scales).any(2)
+    found = linear.copy()
+    found[flat] = (u[flat] * thin[flat][:, None]) @ v[flat]
+    return found
+
+
+def _error_of_steps(placed: Doubles, to_local: Doubles, reach: Doubles) -> float:
     """Return the error of linear steps over four of matrices (m, 4 k + 1, 3, 4), relative to what moves.
 
-    It is of places at most `reach` (m,) from the origins of their coordinates, in parts of the largest one or
-    of the way that it takes.
+    It is of places at most `reach` (m,) from the origins of their coordinates: where the matrices between,
+    `to_local`, take them that `placed` has put into the scene.
     """
-    before, after = placed[:, :-1:4], placed[:, 4::4]
-    worst = np.zeros(len(placed))
+    before, after, worst = to_local[:, :-1:4], to_local[:, 4::4], np.zeros(len(placed))
     for part in (1, 2, 3):
-        off = np.abs(placed[:, part::4] - (before + (after - before) * (part / 4)))
-        far = np.sqrt((off[..., :3] ** 2).sum((-1, -2))) * reach[:, None] + np.sqrt(
-            (off[..., 3] ** 2).sum(-1)
-        )
-        worst = np.maximum(worst, far.max(1))
-    size = np.sqrt((placed[..., :3] ** 2).sum((-1, -2))).max(1) * reach
-    size += np.ptp(placed[..., 3], axis=1).max(1)
+        there = placed[:, part::4]
+        back = before + (after - before) * (part / 4)
+        turned, shifted = back[..., :3] @ there[..., :3] - np.eye(3), back[..., :3] @ there[..., 3:]
+        off = np.sqrt(((shifted[..., 0] + back[..., 3]) ** 2).sum(-1))
+        worst = np.maximum(worst, (np.sqrt((turned**2).sum((-1, -2))) * reach[:, None] + off).max(1))
+    scale = np.sqrt((placed[..., :3] ** 2).sum((-1, -2)) / 3).max(1)
+    size = reach + np.ptp(placed[..., 3], axis=1).max(1) / scale
     return float((worst / np.where(size > 0, size, 1)).max())
 
 
