@@ -47,7 +47,7 @@ class Motions:
             times = np.linspace(begin, end, 4 * steps + 1)
             placed = np.stack([motion(times) for motion in motions])
             placed[:, :, :3, :3] = _thickened(placed[:, :, :3, :3])
-            to_local = np.linalg.inv(placed)[:, :, :3]
+            to_local: Doubles = np.asarray(np.linalg.inv(placed)[:, :, :3], np.float64)
             enough = steps >= min(MOST_STEPS, MOST_MATRICES // len(motions))
             if enough or _error_of_steps(placed[:, :, :3], to_local, reach) <= ERROR:
                 break
