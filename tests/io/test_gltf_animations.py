@@ -177,9 +177,12 @@ def arm() -> Any:
 
 def test_joints_move_a_skinned_mesh(path: Path) -> None:
     turn = [[0, 0, 0, 1], [HALF, 0, 0, HALF]]
-    build = add_clip(
-        arm(), [(2, "rotation", "LINEAR", [0, 1], turn), (1, "translation", "STEP", [0.5], [[2, 0, 0]])]
-    )
+    channels: Channels = [
+        (2, "rotation", "LINEAR", [0, 1], turn),
+        (1, "translation", "STEP", [0.5], [[2, 0, 0]]),
+        (0, "translation", "LINEAR", [0, 1], [[9, 9, 9], [5, 5, 5]]),  # of the mesh, which must not count
+    ]
+    build = add_clip(arm(), channels)
     scene = wf.load(build.gltf(path), strict=True)
     for time, degrees in ((0, 0), (0.5, 45), (2, 90)):
         first, second = np.eye(4), np.eye(4)

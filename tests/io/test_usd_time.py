@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import pickle
+from copy import deepcopy
 from pathlib import Path
 from typing import Any
 
@@ -111,6 +113,16 @@ def test_what_stands_still_is_shared(tmp_path: Path) -> None:
     assert still.shapes[-1].bounds.tolist() == [[-1, -1, -1], [1, 1, 1]]
     assert still.lights == scene.lights
     assert still.camera is camera
+
+
+def test_copies_of_the_scene_move_as_it_does(tmp_path: Path) -> None:
+    scene = wf.load(stage(tmp_path, STILL + SLID + CAMERA))
+    for copied in (pickle.loads(pickle.dumps(scene)), deepcopy(scene)):
+        still = copied.at(2)
+        assert [shape.name for shape in still.shapes] == ["still", "ball"]
+        assert still.shapes[0] is copied.shapes[0]
+        assert still.shapes[1].center.tolist() == [2, 0, 0]
+        assert still.camera.origin.tolist() == [0, 0, 7]
 
 
 def test_a_moment_is_what_is_read_at_its_time(tmp_path: Path) -> None:

@@ -37,7 +37,6 @@ class FileMoments:
         self._shapes, self._lights, self._camera = list(scene.shapes), list(scene.lights), scene.camera
         parts: list[Any] = [*self._shapes, *self._lights]
         self._known = {key: each for each in parts if (key := _made_of(each)) is not None}
-        self._mine = {id(each) for each in parts}
         self._samples: list[Scene] = []
 
     def samples(self, scene: Scene) -> list[Scene]:
@@ -51,7 +50,8 @@ class FileMoments:
 
         What has not changed is the object of the scene itself, with its textures and tables.
         """
-        fresh, mine = self._read(time), self._mine
+        fresh = self._read(time)
+        mine = {id(each) for each in (*self._shapes, *self._lights)}  # not kept: a copy has other ids
         shapes = [self._known.get(_made_of(each) or "", each) for each in fresh.shapes]
         lights = [self._known.get(_made_of(each) or "", each) for each in fresh.lights]
         shapes += [each.at(time) for each in scene.shapes if id(each) not in mine]
