@@ -29,7 +29,9 @@ class Moments:
     def __init__(self, shapes: Sequence[Shape]) -> None:
         self._key = _identity(shapes)
         self._shapes = self._key[0]
-        moving = [number for number, shape in enumerate(shapes) if shape.moves]
+        motions, forms = self._key[-2:]
+        still = all(each is None for each in motions) and all(each is None for each in forms)
+        moving = [] if still else [number for number, shape in enumerate(shapes) if shape.moves]
         placed = [number for number in moving if isinstance(shapes[number], Instance)]
         self.carried = [number for number in placed if shapes[number].motion is not None]
         known = set(self.carried)
