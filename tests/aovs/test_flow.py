@@ -144,6 +144,38 @@ def test_the_flow_begins_in_the_middle_of_the_shutter():
     assert np.array_equal(begin.flow, flows(first).flow, equal_nan=True)
 
 
+def test_flow_across_the_seam_of_a_panorama_takes_the_shorter_way():
+    """Of a ball that passes behind the camera: pixels at the right edge go on at the left one."""
+    sphere = wf.Spheres([[(-0.8, 0, 4)], [(1.2, 0, 4)]], 1, times=[0, 1])
+    camera = wf.Camera.panorama((0, 0, 0), (0, 0, -1), size=(64, 32))
+    image = flows(wf.Scene([sphere], camera=camera).at(START))
+    seen = image.shape_id == 0
+    assert seen[:, 0].any()
+    assert seen[:, -1].any()
+    assert np.abs(image.flow[seen]).max() < 4
+    assert (image.flow[seen][:, 0] < -0.5).all()
+
+
+def test_pictures_are_of_places_not_of_ways(tmp_path):
+    """A checkpoint of a moment goes on with another camera that is there at that time."""
+    one, other = (VIEW.resized(8).transformed(each).at(0) for each in (PAN, SLIDE))
+    assert one.over_time.moves
+    assert np.array_equal(one.origin, other.origin)
+    scene, file = wf.Scene([wf.Box((0, 0, 0), 1)], [wf.Environment(1)]), tmp_path / "a.wfck"
+    render(scene, 1, camera=one, checkpoint=file)
+    assert render(scene, 2, camera=other, checkpoint=file).spp == 2
+
+
+def test_frames_of_a_camera_that_moves_alone_have_their_own_flow():
+    scene = wf.Scene([wf.Box((0, 0, 0), 1)], [wf.Environment(1)], VIEW.resized(12).transformed(PAN))
+    times = [0.1, 0.2, 0.4]
+    for frame, time, after in zip(
+        wf.render_frames(scene, times, 1, aovs="flow", progress=False), times, (0.2, 0.4, 0.6), strict=True
+    ):
+        alone = wf.render(scene.at(time), 1, aovs="flow", flow_times=(0, after), progress=False)
+        assert np.nanmax(np.abs(frame.flow - alone.flow)) < 1e-5
+
+
 def test_what_stands_still_has_no_flow():
     image = flows(wf.Scene([wf.Box((0, 0, 0), 1), wf.Sphere((2, 0, 0), 0.7)], camera=VIEW), (*BOTH, *MASKS))
     seen = image.shape_id >= 0
