@@ -381,3 +381,33 @@ def test_blurred_pictures_are_means_of_stills_with_all_else(name, accel):
     assert_mean_of_stills(
         scene, runs=6, strata=strata, spp=64, still_spp=64 // strata, accel=accel, max_error=0.05, **settings
     )
+
+
+def test_file_that_is_read_anew_for_each_time(tmp_path):
+    """As of USD: its meshes go along lines between the forms of some times."""
+    pytest.importorskip("pxr")
+    path = tmp_path / "slide.usda"
+    path.write_text(
+        """#usda 1.0
+(
+    timeCodesPerSecond = 1
+    startTimeCode = 0
+    endTimeCode = 1
+)
+def Mesh "bar" {
+    uniform token subdivisionScheme = "none"
+    int[] faceVertexCounts = [4]
+    int[] faceVertexIndices = [0, 1, 2, 3]
+    point3f[] points = [(0, -99, 0), (1.1, -99, 0), (1.1, 99, 0), (0, 99, 0)]
+    double3 xformOp:translate.timeSamples = { 0: (-3, 0, 0), 1: (0.7, 0, 0) }
+    uniform token[] xformOpOrder = ["xformOp:translate"]
+}
+"""
+    )
+    camera = wf.Camera.orthographic((0, 0, 5), (0, 0, 0), height=32, size=(16, 64))
+    image = render(
+        wf.load(path).add(wf.Environment(1)), 64, camera=camera, shutter=(0, 1), aovs="alpha", **OPTIONS
+    )
+    alpha = image.layers["alpha"].astype(float).reshape(64, 16)
+    expected = coverage(np.linspace(-1, 7, 17), 1.1, 3.7)
+    assert_columns((alpha.mean(0), alpha.std(0, ddof=1) / 8), expected)

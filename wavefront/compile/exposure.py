@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from copy import copy
 from typing import Any
 
 import numpy as np
 
 from ..arrays.vec import Doubles
-from ..core.errors import SceneError
+from ..core.errors import SceneError, warn_caller
 from ..motion import Moving, Samples
 from ..motion.shutter import Shutter
 from ..motion.steps import Matrices
@@ -36,6 +37,7 @@ def exposed_scene(scene: Scene, shutter: Shutter | None) -> Exposed:
     """
     if shutter is None:
         return Exposed(scene)
+    scene = _sampled(scene, shutter)
     if not any(_moves(each, shutter) for each in (*scene.shapes, *scene.lights)):
         return Exposed(scene.at(shutter.middle))
     still, moving = copy(scene), [shape for shape in scene.shapes if _moves(shape, shutter)]
@@ -52,6 +54,50 @@ def exposed_scene(scene: Scene, shutter: Shutter | None) -> Exposed:
         if _moves(light, shutter):
             found.lights[number] = _rigid(light, shutter)
     return found
+
+
+def _sampled(scene: Scene, shutter: Shutter) -> Scene:
+    """Return a scene whose file is read anew for each time with meshes that deform in its place.
+
+    They go along lines between the forms of some times. What else changes is as in the middle of the time.
+    """
+    if scene.file_moments is None:
+        return scene
+    times = np.linspace(shutter.begin, shutter.end, TIMES)
+    moments = [scene.at(time) for time in times.tolist()]
+    found, middle = copy(scene), moments[TIMES // 2]
+    found.file_moments, columns = None, [moment.shapes for moment in moments]
+    if len({len(shapes) for shapes in columns}) > 1:
+        warn_caller("shapes of the file come or go while the shutter is open; they are as in the middle")
+        columns = [middle.shapes]
+    found.shapes = [_over_time(list(shapes), times) for shapes in zip(*columns, strict=True)]
+    found.lights = middle.lights
+    return found
+
+
+def _over_time(shapes: list[Shape], times: Doubles) -> Shape:
+    """Return a shape that is one of several at each of some times, all of one kind."""
+    middle = shapes[len(shapes) // 2]
+    if all(each is middle for each in shapes):
+        return middle
+    meshes: list[Any] = [each.to_mesh() if isinstance(each, Instance) else each for each in shapes]
+    first = meshes[0]
+    for mesh in meshes:
+        same = isinstance(mesh, Mesh) and isinstance(first, Mesh) and np.array_equal(mesh.faces, first.faces)
+        if not same or len(mesh.vertices) != len(first.vertices):
+            warn_caller(f"{middle.name}: changes while the shutter is open; it is shown as in the middle")
+            return middle
+    return _of_forms(meshes, times)
+
+
+def _of_forms(meshes: Sequence[Any], times: Doubles) -> Mesh:
+    """Return a mesh that is each of some meshes with the same faces at a time, and between on lines."""
+    arrays = {"vertices": np.stack([mesh.vertices for mesh in meshes])}
+    if meshes[0].normals is not None:
+        arrays["normals"] = np.stack([mesh.normals for mesh in meshes])
+    mesh: Mesh = copy(meshes[0])
+    mesh.deformation = Samples(times, arrays)
+    return mesh
 
 
 def _moves(element: Moving, shutter: Shutter) -> bool:
@@ -111,12 +157,7 @@ class _Forms:
     def _as_forms(self, shape: Instance) -> tuple[Mesh, Mesh]:
         """Return an instance as a mesh that deforms, and that in the middle of the time."""
         times = np.linspace(self._shutter.begin, self._shutter.end, FORMS)
-        meshes = [shape.at(time).to_mesh() for time in times.tolist()]
-        arrays = {"vertices": np.stack([mesh.vertices for mesh in meshes])}
-        if meshes[0].normals is not None:
-            arrays["normals"] = np.stack([mesh.normals for mesh in meshes])
-        mesh = copy(meshes[0])
-        mesh.deformation = Samples(times, arrays)
+        mesh = _of_forms([shape.at(time).to_mesh() for time in times.tolist()], times)
         return mesh, mesh.at(self._shutter.middle)
 
     def _of_spheres(self, shape: Spheres) -> Mover:
