@@ -390,6 +390,7 @@ def test_file_that_is_read_anew_for_each_time(tmp_path):
     path.write_text(
         """#usda 1.0
 (
+    metersPerUnit = 1
     timeCodesPerSecond = 1
     startTimeCode = 0
     endTimeCode = 1
