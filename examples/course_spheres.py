@@ -25,12 +25,12 @@ def wall(axis: int, side: int, distance: float, color: tuple[float, float, float
 def course_spheres(size: int = 512) -> wf.Scene:
     """Return the room: balls of radius 10 on a floor at y = -10, seen from z = 55."""
     walls = [
-        wall(1, -1, 10, (0.75, 0.75, 0.75)),  # floor
+        wall(1, -1, 10, (0.60, 0.60, 0.60)),  # floor
         wall(1, +1, 50, (0.85, 0.85, 0.85)),  # ceiling
         wall(0, -1, 45, (0.75, 0.25, 0.25)),  # left
         wall(0, +1, 45, (0.25, 0.35, 0.75)),  # right
         wall(2, -1, 50, (0.35, 0.70, 0.40)),  # back
-        wall(2, +1, 75, (0.75, 0.45, 0.70)),  # behind the camera
+        wall(2, +1, 75, (0.70, 0.70, 0.70)),  # behind the camera
     ]
     balls = [
         wf.Sphere((-21, 0, -4), 10, material=wf.Diffuse((0.9, 0.6, 0.2)), name="matte"),
@@ -48,5 +48,5 @@ if __name__ == "__main__":
     parser.add_argument("--spp", type=int, default=100)
     parser.add_argument("--size", type=int, default=512)
     options = parser.parse_args()
-    wf.render(course_spheres(options.size), options.spp).save(options.output)
+    wf.render(course_spheres(options.size), options.spp).save(options.output, tone="agx", exposure=-0.4)
     print(f"wrote {options.output}")

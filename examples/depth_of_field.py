@@ -21,13 +21,18 @@ def scene(size: int = 640, aperture: float = 0.5, focus: float | None = None) ->
     for k in range(-2, 5):
         color = colorsys.hsv_to_rgb(0.08 + (k + 2) / 9, 0.75, 0.8)
         spheres.append(wf.Sphere((0.95 * (k - 0.5), 0.7, -1.9 * k), 0.7, material=wf.Diffuse(color)))
-    lights = [wf.Sphere((2.5 * x, 2.6, -16), 0.06, emission=120.0) for x in range(-3, 4)]
-    ground = wf.Rectangle((-40, 0, 40), (80, 0, 0), (0, 0, -80), material=wf.Diffuse(0.5), name="ground")
+    lights = []
+    for k in range(9):  # a string of lamps far behind, which the lens spreads into discs
+        color = np.array(colorsys.hsv_to_rgb(0.02 + 0.018 * k, 0.7, 1.0))
+        lights.append(wf.Sphere((2.1 * (k - 4), 2.4 + 0.05 * (k - 4) ** 2, -16), 0.2, emission=7 * color))
+    ground = wf.Rectangle(
+        (-40, 0, 40), (80, 0, 0), (0, 0, -80), material=wf.Diffuse((0.4, 0.38, 0.36)), name="ground"
+    )
     sun = wf.DirectionalLight((-0.6, -1, -0.5), (2.4, 2.2, 1.9), angle=2)
     camera = wf.Camera.look_at(
         EYE, AHEAD, fov=24, size=(size, size * 9 // 16), aperture=aperture, focus=focus
     )
-    return wf.Scene([ground, *spheres, *lights], [wf.Environment((0.25, 0.3, 0.4)), sun], camera)
+    return wf.Scene([ground, *spheres, *lights], [wf.Environment((0.12, 0.16, 0.26)), sun], camera)
 
 
 if __name__ == "__main__":
@@ -40,5 +45,7 @@ if __name__ == "__main__":
         "--focus", type=float, help="distance of the sharp plane (default: the middle sphere)"
     )
     options = parser.parse_args()
-    wf.render(scene(options.size, options.aperture, options.focus), options.spp).save(options.output)
+    wf.render(scene(options.size, options.aperture, options.focus), options.spp).save(
+        options.output, tone="agx", exposure=0.3
+    )
     print(f"wrote {options.output}")

@@ -88,7 +88,7 @@ def png(codes: np.ndarray) -> bytes:
     return out
 
 
-def turned(radius: np.ndarray, height: np.ndarray, around: int = 64) -> tuple[np.ndarray, ...]:
+def turned(radius: np.ndarray, height: np.ndarray, around: int = 128) -> tuple[np.ndarray, ...]:
     """Return a profile turned about the y axis: positions, normals, texture coordinates, faces."""
     angle = np.linspace(0, 2 * np.pi, around + 1)
     c, s = np.cos(angle)[:, None], np.sin(angle)[:, None]
@@ -131,13 +131,14 @@ def urn(glb: Glb) -> int:
     height = np.linspace(0, 1, 97)
     belly = 0.16 + 0.5 * np.sin(np.pi * np.clip(0.08 + 0.8 * height, 0, 1)) ** 1.6
     lip = 0.1 * np.exp(-(((height - 1) / 0.05) ** 2))
-    u, v = np.meshgrid((np.arange(512) + 0.5) / 512, (np.arange(256) + 0.5) / 256)
-    bands = (np.abs(v - 0.2) < 0.02) | (np.abs(v - 0.72) < 0.02) | (v < 0.05) | (v > 0.95)
-    waves = np.abs(v - 0.46 - 0.13 * np.sin(2 * np.pi * 8 * u)) < 0.025
-    waves |= np.abs(v - 0.46 + 0.13 * np.sin(2 * np.pi * 8 * u)) < 0.025
-    gold = (bands | waves)[:, :, None]
-    base = np.where(gold, (1.0, 0.84, 0.46), (0.08, 0.2, 0.5))  # sRGB
-    metallic_roughness = np.where(gold, (0.0, 0.3, 1.0), (0.0, 0.12, 0.0))  # green and blue hold them
+    u, v = np.meshgrid((np.arange(1536) + 0.5) / 1536, (np.arange(512) + 0.5) / 512)
+    bands = [np.abs(v - 0.2) - 0.02, np.abs(v - 0.72) - 0.02, v - 0.05, 0.95 - v]
+    steep = np.hypot(1, 2.7 * np.cos(2 * np.pi * 8 * u))  # so that the lines are equally wide everywhere
+    waves = [np.abs(v - 0.46 - 0.13 * side * np.sin(2 * np.pi * 8 * u)) / steep - 0.014 for side in (-1, 1)]
+    outside = np.min([*bands, *waves], axis=0)  # distance from what is gilded
+    gold = np.clip(0.5 - 512 * outside, 0, 1)[:, :, None]  # an edge is one texel wide, not a stair
+    base = (0.08, 0.2, 0.5) + gold * np.array((0.92, 0.64, -0.04))  # sRGB
+    metallic_roughness = (0.0, 0.12, 0.0) + gold * np.array((0.0, 0.18, 1.0))  # green and blue hold them
     material = {
         "pbrMetallicRoughness": {
             "baseColorTexture": glb.texture(codes(base)),
@@ -150,8 +151,9 @@ def urn(glb: Glb) -> int:
 
 def lattice(glb: Glb) -> int:
     """Add a wooden screen whose holes are cut out by the alpha of its color; return its mesh."""
-    x, y = np.meshgrid((np.arange(128) + 0.5) / 128, (np.arange(128) + 0.5) / 128)
-    bars = np.minimum(np.abs((x + y) % 1 - 0.5), np.abs((x - y) % 1 - 0.5)) < 0.13
+    x, y = np.meshgrid((np.arange(256) + 0.5) / 256, (np.arange(256) + 0.5) / 256)
+    outside = np.minimum(np.abs((x + y) % 1 - 0.5), np.abs((x - y) % 1 - 0.5)) - 0.13
+    bars = np.clip(0.5 - 32 * outside, 0, 1)  # a ramp, which the mask's cutoff cuts between the texels
     wood = np.array([0.52, 0.33, 0.2]) * (0.9 + 0.1 * np.sin(40 * x + 6 * np.sin(5 * y)))[:, :, None]
     material = {
         "pbrMetallicRoughness": {
@@ -188,7 +190,7 @@ def pillar(glb: Glb) -> int:
     height = np.linspace(0, 1, 65)
     flare = 0.09 * (np.exp(-((height / 0.06) ** 2)) + np.exp(-(((1 - height) / 0.06) ** 2)))
     plain = {"baseColorFactor": [0.75, 0.73, 0.7, 1], "metallicFactor": 0, "roughnessFactor": 0.7}
-    return glb.mesh(turned(0.15 + flare, 2.4 * height, 32), {"pbrMetallicRoughness": plain})
+    return glb.mesh(turned(0.15 + flare, 2.4 * height, 64), {"pbrMetallicRoughness": plain})
 
 
 def floor(glb: Glb) -> int:
@@ -267,5 +269,5 @@ if __name__ == "__main__":
     still_life = scene(path, options.size)
     shared = sum(isinstance(shape, wf.Instance) for shape in still_life.shapes)
     print(f"wrote {path} and read it: {still_life}; {shared} of the shapes share one mesh")
-    wf.render(still_life, options.spp).save(options.output)
+    wf.render(still_life, options.spp).save(options.output, tone="agx", exposure=0.5)
     print(f"wrote {options.output}")

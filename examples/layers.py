@@ -13,7 +13,7 @@ from pathlib import Path
 
 import numpy as np
 from PIL import Image as PillowImage
-from PIL import ImageDraw
+from PIL import ImageDraw, ImageFont
 
 import wavefront as wf
 
@@ -48,8 +48,8 @@ def still_life(size: int) -> wf.Scene:
         material=wf.Diffuse(wf.Texture(checker, filter="nearest")),
         name="table",
     )
-    shining = wf.Material(wf.Diffuse(0), emission=(34, 26, 16), group="lamp")
-    lamp = wf.Disk((-2.5, 4, 2), (2.5, -4, -2), 0.7, material=shining, name="lamp")
+    shining = wf.Material(wf.Diffuse(0), emission=(11, 8.5, 5.3), group="lamp")
+    lamp = wf.Disk((-2.5, 4, 2), (2.5, -4, -2), 1.2, material=shining, name="lamp")
     balls = [
         wf.Sphere((-0.95, 0.6, 0.2), 0.6, material=wf.Dielectric(1.5), name="glass"),
         wf.Sphere((0.35, 0.8, -0.7), 0.8, material=wf.Conductor.named("gold", roughness=0.25), name="gold"),
@@ -91,14 +91,14 @@ def sheet(image: wf.Image) -> PillowImage.Image:
     canvas = PillowImage.new(
         "RGB", (columns * (width + GAP) - GAP, rows * (height + GAP) - GAP), (255, 255, 255)
     )
-    draw = ImageDraw.Draw(canvas)
+    draw, font = ImageDraw.Draw(canvas), ImageFont.load_default(max(width / 20, 6))
     for y, names in enumerate(TILES):
         for x, name in enumerate(names):
             left, top = x * (width + GAP), y * (height + GAP)
             canvas.paste(PillowImage.fromarray(tile(image, name)), (left, top))
-            label = draw.textbbox((left + 6, top + 4), name)
+            label = draw.textbbox((left + 6, top + 4), name, font)
             draw.rectangle((label[0] - 3, label[1] - 2, label[2] + 3, label[3] + 2), fill=(0, 0, 0))
-            draw.text((left + 6, top + 4), name, fill=(255, 255, 255))
+            draw.text((left + 6, top + 4), name, (255, 255, 255), font)
     return canvas
 
 

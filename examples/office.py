@@ -33,6 +33,10 @@ def office(size: int) -> wf.Scene:
         wf.Box((5.1, 1.6, 3.8), (0.2, 1.6, 0.4), material=WALL),
         wf.Box((5.1, 1.6, 2), (0.08, 1.6, 0.06), material=WHITE),
     ]
+    shapes += [
+        wf.Rectangle((5.2, 0, 60), (200, 0, 0), (0, 0, -120), material=wf.Diffuse((0.12, 0.2, 0.06))),  # lawn
+        wf.Box((70, 3, 2), (10, 6, 90), material=wf.Diffuse((0.09, 0.14, 0.05))),  # trees at its end
+    ]
     for x in (1.5, 3.6):
         shapes += [
             wf.Box((x, 0.73, 0.9), (1.5, 0.04, 0.8), material=WOOD),
@@ -63,8 +67,8 @@ if __name__ == "__main__":
     figure = Figure(figsize=(12, 4.4), layout="constrained")
     canvas = FigureCanvasAgg(figure)
     seen, coded = figure.subplots(1, 2)
-    seen.imshow(image.to_uint8(exposure=wf.exposure(ev100=10), gamma="srgb", tone="agx"))
-    image.false_color((10, 10_000), axes=coded)
+    seen.imshow(image.to_uint8(exposure=wf.exposure(ev100=11.3), gamma="srgb", tone="agx"))
+    image.false_color((10, 30_000), axes=coded)
     for axes in (seen, coded):
         axes.set_axis_off()
     canvas.draw()

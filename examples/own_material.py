@@ -1,7 +1,7 @@
 """A material of your own in about 20 lines: a retro-reflector, as on road signs and bicycles.
 
 It sends light back to where it came from. The class gives the three methods of the contract, a
-checker proves them right, and a picture by the light of a headlight shows what it does.
+checker proves them right, and a road in the light of a headlight shows what it does.
 
 python examples/own_material.py [out.png] [--spp 64] [--size 400]
 """
@@ -41,18 +41,32 @@ class RetroReflector(wf.Bsdf):
         return wf.BsdfSample(wi, weight, pdf, np.zeros(len(pdf), bool))
 
 
-def road_at_night(size: int) -> wf.Scene:
+def dusk(rows: int = 64) -> np.ndarray:
+    """Return the radiance of the sky after sunset, (rows, 2, 3): orange at the horizon, dark below it."""
+    height = np.cos(np.pi * (np.arange(rows) + 0.5) / rows)[:, None]
+    blue, orange = np.array([0.03, 0.06, 0.16]), np.array([0.55, 0.24, 0.10])
+    colors = np.where(height > 0, blue + orange * np.exp(-7 * height.clip(0)), 0.01)
+    return np.repeat(colors[:, None], 2, axis=1)
+
+
+def road_at_dusk(size: int) -> wf.Scene:
     """Return pairs of balls along a road, matte ones on the left and retro-reflecting on the right."""
     orange = (0.95, 0.35, 0.05)
-    shapes = [wf.Rectangle((-20, 0, 2), (40, 0, 0), (0, 0, -80), material=wf.Diffuse(0.2), name="road")]
-    for z in (-3, -6, -10, -16):
+    ground = wf.Rectangle((-400, 0, 4), (800, 0, 0), (0, 0, -800), material=wf.Diffuse((0.16, 0.2, 0.1)))
+    road = wf.Rectangle((-2.9, 0.01, 4), (5.8, 0, 0), (0, 0, -800), material=wf.Diffuse(0.3), name="road")
+    shapes = [ground, road]
+    paint = wf.Diffuse(0.7)
+    shapes += [
+        wf.Rectangle((-0.09, 0.02, z), (0.18, 0, 0), (0, 0, -2), material=paint) for z in range(-2, -80, -4)
+    ]
+    for z in (-3, -6.5, -11, -18, -30):
         shapes += [
-            wf.Sphere((-1.7, 0.6, z), 0.6, material=wf.Diffuse(orange)),
-            wf.Sphere((1.7, 0.6, z), 0.6, material=RetroReflector(orange, exponent=40)),
+            wf.Sphere((-1.9, 0.7, z), 0.7, material=wf.Diffuse(orange)),
+            wf.Sphere((1.9, 0.7, z), 0.7, material=RetroReflector(orange, exponent=40)),
         ]
-    headlight = wf.PointLight((0, 2, 2.2), intensity=22)
-    camera = wf.Camera.look_at((0, 2.4, 2), (0, 0.4, -6), fov=50, size=(size, size * 5 // 8))
-    return wf.Scene(shapes, [headlight], camera)
+    headlight = wf.PointLight((0, 1.9, 2.2), intensity=16)
+    camera = wf.Camera.look_at((0, 2.1, 3), (0, 1.0, -6), fov=46, size=(size, size * 5 // 8))
+    return wf.Scene(shapes, [headlight, wf.Environment(dusk())], camera)
 
 
 if __name__ == "__main__":
@@ -62,5 +76,5 @@ if __name__ == "__main__":
     parser.add_argument("--size", type=int, default=400)
     options = parser.parse_args()
     print(wf.testing.check_bsdf(RetroReflector((0.95, 0.35, 0.05), exponent=40), samples=200_000))
-    wf.render(road_at_night(options.size), options.spp).save(options.output)
+    wf.render(road_at_dusk(options.size), options.spp).save(options.output, tone="agx")
     print(f"wrote {options.output}")

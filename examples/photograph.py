@@ -41,19 +41,19 @@ def desk() -> list[wf.Shape]:
     )
     plaster = np.array([0.42, 0.47, 0.44]) * (1 + 0.08 * noise((512, 512), 8, 31))[..., None]
     clay = wf.Principled((0.62, 0.60, 0.55), roughness=0.35, clearcoat=0.5)
+    turn = np.linspace(-0.5 * np.pi, 0.5 * np.pi, 33)
+    rim = np.stack([2.3 + 0.43 * np.cos(2 * turn), 1.05 + 0 * turn, -1.7 + 0.43 * np.sin(2 * turn)], 1)
+    handle = np.stack([2.7 + 0.33 * np.cos(turn), 0.55 + 0.29 * np.sin(turn), 0 * turn - 1.7], 1)
     return [
         wf.Rectangle((-7, 0, 5), (14, 0, 0), (0, 0, -8.4), material=top),
         wf.Rectangle((-9, -2, -3.4), (18, 0, 0), (0, 9, 0), material=wf.Diffuse(wf.Texture(plaster))),
         cushion((-1.9, 0.16, -1.6), (1.1, 0.16, 0.75), wf.Diffuse((0.10, 0.16, 0.24)), 0.1),
         cushion((-1.8, 0.45, -1.6), (0.95, 0.13, 0.66), wf.Diffuse((0.45, 0.12, 0.08)), 0.1),
         wf.Cylinders([(2.3, 0, -1.7)], [(2.3, 1.05, -1.7)], 0.45, material=clay),
-        wf.Disk((2.3, 1.05, -1.7), (0, 1, 0), 0.45, material=wf.Diffuse((0.05, 0.03, 0.02))),
-        wf.Capsules(
-            [(2.72, 0.8, -1.7), (3.0, 0.65, -1.7)],
-            [(3.0, 0.65, -1.7), (2.72, 0.3, -1.7)],
-            0.07,
-            material=clay,
-        ),
+        wf.Cylinders([(2.3, 0.5, -1.7)], [(2.3, 1.05, -1.7)], 0.41, material=clay),
+        wf.Capsules(rim[:-1], rim[1:], 0.02, material=clay),
+        wf.Disk((2.3, 0.95, -1.7), (0, 1, 0), 0.41, material=wf.Diffuse((0.05, 0.03, 0.02))),
+        wf.Capsules(handle[:-1], handle[1:], 0.065, material=clay),
         box((-5.6, 0, -3.2), (-3.6, 3.4, -2.7), wf.Diffuse((0.16, 0.10, 0.06))),
     ]
 

@@ -26,12 +26,13 @@ def bump(x: Field, width: float) -> Field:
 
 def distances() -> tuple[Field, Field, Field]:
     """Return heights (ROWS, 1), directions (1, COLUMNS) in radians with the face at 0, and distances."""
-    y = np.linspace(0.40, 2.74, ROWS)[:, None]
+    y = np.linspace(0.40, 2.84, ROWS)[:, None]
     phi = np.linspace(-np.pi, np.pi, COLUMNS, endpoint=False)[None, :]
     side, front, back = np.abs(phi), np.cos(phi).clip(0), (-np.cos(phi)).clip(0)
-    crown = (1 - np.abs((y - 1.94) / 0.80).clip(0, 1) ** 2.5) ** 0.4
+    dome = np.where(y > 1.94, (y - 1.94) / 0.90, (1.94 - y) / 0.80).clip(0, 1)
+    crown = (1 - dome ** np.where(y > 1.94, 2.0, 2.5)) ** np.where(y > 1.94, 0.5, 0.4)
     jaw = np.clip((y - 1.18) / 0.75, 0, 1) ** 0.7
-    head = crown * (0.53 + 0.10 * front**2 + 0.16 * back**2 * jaw) * (0.80 + 0.20 * jaw)
+    head = crown * (0.53 + 0.10 * front**2 + 0.20 * back**2 * jaw) * (0.80 + 0.20 * jaw)
     neck = 0.33 + 0.06 * back - 0.03 * front + 0.05 * bump(y - 0.9, 0.15)
     chest = 0.98 * np.sqrt((1 - ((y - 0.40) / 0.55).clip(-1, 1) ** 2).clip(0)) * (1 - 0.28 * np.cos(phi) ** 2)
     r = (np.power(head, 7) + np.power(neck * (y < 2.0), 7) + np.power(chest, 7)) ** (1 / 7)
@@ -41,8 +42,7 @@ def distances() -> tuple[Field, Field, Field]:
     r += 0.035 * bump(side - 0.17, 0.07) * bump(y - 1.655, 0.05)  # wings of the nose
     r += 0.050 * bump(y - 2.07 - 0.03 * side, 0.06) * bump(side - 0.25, 0.32)  # brows
     r -= 0.090 * bump(y - 1.955, 0.065) * bump(side - 0.33, 0.15)  # hollows of the eyes
-    r += 0.050 * bump(y - 1.94, 0.045) * bump(side - 0.34, 0.11)  # eyes
-    r -= 0.014 * bump(y - 1.94, 0.006) * bump(side - 0.34, 0.10)  # between the lids
+    r += eye(y - 1.945, (side - 0.36) * 0.62)
     r += 0.035 * bump(y - 1.74, 0.13) * bump(side - 0.55, 0.2)  # cheeks
     r += 0.052 * bump(y - 1.49, 0.028) * bump(phi, 0.20)  # upper lip
     r += 0.055 * bump(y - 1.425, 0.030) * bump(phi, 0.17)  # lower lip
@@ -54,10 +54,21 @@ def distances() -> tuple[Field, Field, Field]:
     hair *= 1 - bump(side - 1.58, 0.22) * (y < 1.98)
     waves = noise((ROWS, COLUMNS), 12, 3, 3)
     locks = np.sin(26 * (y - 0.10 * side**2) + 3 * np.sin(7 * phi) + 5 * waves)
-    r += hair * (0.045 + 0.024 * locks + 0.02 * waves) * np.clip((2.74 - y) / 0.12, 0, 1)
+    r += hair * (0.045 + 0.024 * locks + 0.02 * waves) * np.clip((2.84 - y) / 0.12, 0, 1)
     r += 0.004 * noise((ROWS, COLUMNS), 40, 5, 3)  # the tool of the sculptor
     r += np.random.default_rng(1).normal(0, 0.0009, r.shape)  # the scanner
     return y, phi, r.clip(1e-3)
+
+
+def eye(up: Field, out: Field) -> Field:
+    """Return what an eye adds to the distances: a ball between two lids, with a carved iris and pupil."""
+    opening = 0.046 * (1 - (out / 0.115) ** 2)  # half the height between the lids, negative beside them
+    slit = np.where(up > 0, up / 1.1, -up / 0.8) - opening  # negative where the ball is seen
+    ball = 0.062 * bump(up, 0.085) * bump(out, 0.12)
+    lids = (0.030 * bump(slit - 0.008, 0.012) + 0.010 * (up > 0) * bump(slit - 0.04, 0.03)) * bump(out, 0.125)
+    center = np.hypot(up - 0.006, out)
+    iris = -0.010 * bump(center - 0.036, 0.007) - 0.028 * bump(center, 0.016)
+    return ball + np.where(up > 0, lids, 0.7 * lids) + iris * (slit < -0.004)
 
 
 def head() -> wf.Mesh:
@@ -109,7 +120,7 @@ def scan(size: int = 600) -> wf.Scene:
         wf.Rectangle((-3.6, 1.2, 2.4), (0, 2.6, 0), (1.5, 0, 1.6), emission=(9.5, 8.4, 7.0)),
         wf.Rectangle((3.4, 0.6, -1.6), (0, 2.6, 0), (0.5, 0, 1.6), emission=(2.2, 3.2, 4.6), two_sided=True),
     ]
-    camera = wf.Camera.look_at((0, 1.75, 6.4), (0, 1.53, 0), fov=25, size=(size, size * 2 // 3))
+    camera = wf.Camera.look_at((0, 1.75, 6.4), (0, 1.58, 0), fov=26, size=(size, size * 2 // 3))
     return wf.Scene(shapes, [wf.Environment(0.12)], camera)
 
 
