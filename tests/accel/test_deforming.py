@@ -9,7 +9,7 @@ from wavefront.accel.deforming import DeformingAccelerator, SweptSpheres, SweptT
 from wavefront.accel.numpy_accel import NumpyAccelerator
 from wavefront.accel.sphere import SpherePrimitives
 
-N = 4000
+N = 1500
 TIMES = np.array([1.0, 1.5, 3.0])
 
 
