@@ -105,7 +105,7 @@ def test_the_program_runs_and_fails_as_its_commands(mesh: Path) -> None:
         (["turntable", "mesh.obj", "--frames", "0", "--quiet"], "'0' is not a whole number from 1 on"),
         (["dataset", "mesh.obj", "-o", "set", "--object", "x", "--quiet"], "objects has 'x'"),
         (["dataset", "mesh.obj", "-o", "set", "--format", "kitti", "--quiet"], "give at least two times"),
-        (["dataset", "mesh.obj", "-o", "set", "--times", "0,x", "--quiet"], "'x'"),
+        (["dataset", "mesh.obj", "-o", "set", "--times", "0,x", "--quiet"], "'0,x'"),
         (["merge", "mesh.obj", "-o", "out.npz"], "mesh.obj: extension is '.obj'"),
         (["resume", "mesh.obj"], "mesh.obj: "),
         (["compare", "a.png", "b.png"], "a.png: there is no such file"),
