@@ -86,7 +86,8 @@ def scenes():
 
 def assert_mean_of_stills(scene, runs, spp, stills, rows=(0, 3, 4, 7), **options):
     """Test that rows have the mean of stills at random times in strata of the exposure of each row."""
-    options = {"max_bounces": 3, "ground": False, "branches": 1, "reuse": False, **options}
+    plain = {"max_bounces": 3, "ground": False, "branches": 1, "reuse": False}
+    options = {**plain, **options}
     rolling = scene.camera.replace(rolling_shutter=0.8)
     rolled, means = [], []
     for run in range(runs):
@@ -102,7 +103,7 @@ def assert_mean_of_stills(scene, runs, spp, stills, rows=(0, 3, 4, 7), **options
                     4,
                     seed=1000 * run + 100 * row + at + 1,
                     camera=scene.camera.at(time).cropped((0, row, 8, row + 1)),
-                    **options,
+                    **plain,
                 ).rgb.astype(float)
                 for at, time in enumerate(times.tolist())
             ]
