@@ -23,8 +23,8 @@ def scene(size: int = 640, aperture: float = 0.5, focus: float | None = None) ->
         spheres.append(wf.Sphere((0.95 * (k - 0.5), 0.7, -1.9 * k), 0.7, material=wf.Diffuse(color)))
     lights = []
     for k in range(9):  # a string of lamps far behind, which the lens spreads into discs
-        color = np.array(colorsys.hsv_to_rgb(0.02 + 0.018 * k, 0.7, 1.0))
-        lights.append(wf.Sphere((2.1 * (k - 4), 2.4 + 0.05 * (k - 4) ** 2, -16), 0.2, emission=7 * color))
+        color = np.array(colorsys.hsv_to_rgb(0.02 + 0.018 * k, 0.85, 1.0))
+        lights.append(wf.Sphere((2.1 * (k - 4), 2.4 + 0.05 * (k - 4) ** 2, -16), 0.2, emission=3 * color))
     ground = wf.Rectangle(
         (-40, 0, 40), (80, 0, 0), (0, 0, -80), material=wf.Diffuse((0.4, 0.38, 0.36)), name="ground"
     )
@@ -46,6 +46,6 @@ if __name__ == "__main__":
     )
     options = parser.parse_args()
     wf.render(scene(options.size, options.aperture, options.focus), options.spp).save(
-        options.output, tone="agx", exposure=0.3
+        options.output, tone="agx_punchy", exposure=0.5
     )
     print(f"wrote {options.output}")

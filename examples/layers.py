@@ -60,9 +60,9 @@ def still_life(size: int) -> wf.Scene:
 
 
 def tile(image: wf.Image, name: str) -> np.ndarray:
-    """Return a layer as colors to look at, (H, W, 3) uint8."""
+    """Return a layer as colors to look at, (H, W, 3) uint8; light without its noise."""
     if name == "rgb":
-        return image.to_uint8(tone="aces", exposure=0.4)
+        return image.denoise().to_uint8(tone="aces", exposure=0.4)
     values = image.layers[name]
     if name.endswith("_id"):
         return np.uint8(255 * id_colors(values))
@@ -75,7 +75,8 @@ def tile(image: wf.Image, name: str) -> np.ndarray:
         values = np.concatenate([values, np.zeros_like(values[..., :1])], axis=-1)
     colors = values if values.ndim == 3 else np.repeat(values[..., None], 3, axis=-1)
     radiance = name in ("direct", "indirect", "albedo") or name.startswith("light_groups")
-    return wf.Image(np.nan_to_num(colors, nan=0.0)).to_uint8(gamma=2.2 if radiance else 1)
+    picture = wf.Image(np.nan_to_num(colors, nan=0.0))
+    return picture.denoise().to_uint8() if radiance else picture.to_uint8(gamma=1)
 
 
 def id_colors(ids: np.ndarray) -> np.ndarray:
