@@ -44,7 +44,7 @@ PICTURES = {  # size, samples per pixel, whether it is denoised, whether it has 
     "material_sheet": (1200, 40, True, False),
     "skies": (400, 24, True, False),
     "office": (480, 40, True, False),
-    "layers": (297, 128, False, False),
+    "layers": (297, 96, False, False),
     "estimators": (300, 32, False, False),
     "default_look": (1200, 32, True, False),
 }

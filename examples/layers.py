@@ -62,7 +62,7 @@ def still_life(size: int) -> wf.Scene:
 def tile(image: wf.Image, name: str) -> np.ndarray:
     """Return a layer as colors to look at, (H, W, 3) uint8; light without its noise."""
     if name == "rgb":
-        return image.denoise().to_uint8(tone="aces", exposure=0.4)
+        return wf.Image(image.rgb).denoise().to_uint8(tone="aces", exposure=0.4)
     values = image.layers[name]
     if name.endswith("_id"):
         return np.uint8(255 * id_colors(values))

@@ -290,3 +290,9 @@ def test_merging_denoised_pictures() -> None:
     assert merged.noisy is None
     assert "denoiser" not in merged.metadata
     assert merged.denoise().noisy is not None
+
+
+def test_normals_without_an_albedo(denoiser) -> None:
+    scene = wf.Scene(wf.Sphere((0, 0, 0), 1), wf.Environment(1))
+    image = wf.render(scene, 16, size=(16, 12), aovs=("denoising_normal",), progress=False)
+    assert np.isfinite(image.denoise(denoiser).rgb).all()

@@ -44,7 +44,7 @@ def open_image_denoise(picture: NoisyPicture) -> Floats:
         guides: dict[str, Floats] = {}
         if picture.albedo is not None:
             guides["albedo"] = _values(picture.albedo, 0)
-        if picture.normal is not None:
+        if guides and picture.normal is not None:  # the library takes no normal without an albedo
             guides["normal"] = _values(picture.normal, -1)
         clean = not 0 < picture.spp < FEW and bool(guides)
         if clean:
