@@ -84,6 +84,7 @@ def links_to_the_tutorial(app, docname, source):
             re.sub(r"<(\d\w+)\.py>`_", r"<\1.html>`_", source[0])
             .replace("<tracer.py>`_", "<09_the_library.html>`_")
             .replace("<../algorithm.md>`_", "<../../algorithm.html>`_")
+            .replace("<../gallery.md>`_", "<../../gallery.html>`_")
         )
 
 

@@ -98,6 +98,13 @@ image = wf.render(scene, spp=1, max_bounces=2, branches=1, reuse=False)
 print(np.array_equal(steps[-1].light.T.reshape(48, 48, 3), image.rgb))
 
 # %%
+# In the library
+# --------------
+#
+# ``integrators/ladder.py`` has the loop, and ``integrators/steps.py`` the stages that it calls.
+# ``watching/trace.py`` is told by the recorder that travels with the paths. ``print(wf.program(scene))`` lists
+# the stages of a scene.
+#
 # Exercises
 # ---------
 #
