@@ -8,6 +8,7 @@ from __future__ import annotations
 import argparse
 
 import numpy as np
+from PIL import Image, ImageDraw, ImageFont
 
 import wavefront as wf
 
@@ -26,12 +27,11 @@ SKIES = {
 
 def scene(sky: wf.Sky, size: int) -> wf.Scene:
     """Return a few shapes on a level ground."""
-    gray = wf.Diffuse(0.65)
     shapes = [
         wf.Disk((0, 0, 0), (0, 1, 0), 500, material=wf.Diffuse(0.25), name="ground"),
-        wf.Sphere((0, 1, 0), 1, material=gray),
+        wf.Sphere((0, 1, 0), 1, material=wf.Plastic((0.75, 0.2, 0.08), roughness=0.2)),
         wf.Sphere((2.2, 0.7, 0.5), 0.7, material=wf.Mirror(0.9)),
-        wf.Box((-2.1, 0.8, -0.4), (1.3, 1.6, 1.3), material=gray),
+        wf.Box((-2.1, 0.8, -0.4), (1.3, 1.6, 1.3), material=wf.Diffuse((0.2, 0.4, 0.6))),
     ]
     camera = wf.Camera.look_at((2.5, 1.7, 7.5), (0.1, 1.1, 0), fov=38, size=(size, size * 2 // 3))
     return wf.Scene(shapes, [sky], camera)
@@ -43,8 +43,14 @@ if __name__ == "__main__":
     parser.add_argument("--spp", type=int, default=32)
     parser.add_argument("--size", type=int, default=320, help="width of each of the six pictures")
     options = parser.parse_args()
-    pictures = [np.asarray(wf.render(scene(sky, options.size), options.spp)) for sky in SKIES.values()]
+    pictures = []
+    for name, sky in SKIES.items():
+        codes = wf.render(scene(sky, options.size), options.spp).to_uint8(gamma="srgb", tone="agx_punchy")
+        picture = Image.fromarray(codes)
+        draw, at = ImageDraw.Draw(picture), options.size // 40
+        font = ImageFont.load_default(max(options.size // 20, 8))
+        draw.text((at, at), name, "white", font, stroke_width=2, stroke_fill="black")
+        pictures.append(np.asarray(picture))
     rows = [np.concatenate(pictures[first : first + 3], axis=1) for first in (0, 3)]
-    wf.Image(np.concatenate(rows), options.spp).save(options.output, gamma="srgb", tone="agx")
-    print(f"from left to right, from the top: {', '.join(SKIES)}")
+    Image.fromarray(np.concatenate(rows)).save(options.output)
     print(f"wrote {options.output}")

@@ -102,8 +102,8 @@ print(np.array_equal(steps[-1].light.T.reshape(48, 48, 3), image.rgb))
 # --------------
 #
 # ``integrators/ladder.py`` has the loop, and ``integrators/steps.py`` the stages that it calls.
-# ``watching/trace.py`` is told by the recorder that travels with the paths. ``print(wf.program(scene))`` lists
-# the stages of a scene.
+# ``watching/trace.py`` is told by the recorder that travels with the paths. ``print(wf.program(scene))``
+# lists the stages of a scene.
 #
 # Exercises
 # ---------
