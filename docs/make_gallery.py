@@ -30,7 +30,7 @@ PICTURES = {  # size, samples per pixel, whether it is denoised, whether it has 
     "fruit": (1200, 14, True, True),
     "photograph": (1200, 4, True, True),
     "caustics": (1200, 32, True, True),
-    "fog": (1200, 64, True, False),
+    "fog": (1200, 8, True, False),
     "milk": (600, 64, True, False),
     "cornell_box": (1200, 32, True, True),
     "course_spheres": (1200, 10, True, True),
