@@ -4,8 +4,7 @@ import struct
 from functools import cache
 
 import numpy as np
-
-from wavefront.sampling.bilinear import BilinearDensity
+from inside import BilinearDensity
 
 CODES = {"uint8": 1, "float32": 10, "float64": 11}
 PHI = {

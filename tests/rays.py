@@ -4,9 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import trimesh
-
-from wavefront.accel import Accelerator, Geometry
-from wavefront.accel.sphere import SpherePrimitives
+from inside import Accelerator, Geometry, SpherePrimitives
 
 f4 = np.float32
 

@@ -11,12 +11,11 @@ from dataclasses import dataclass, field
 
 import numpy as np
 import pytest
+from inside import ConstantEnvironment, Floats, f4
 from numpy.typing import ArrayLike, NDArray
 from significance import SIDE
 
 import wavefront as wf
-from wavefront.arrays.vec import Floats, f4
-from wavefront.lights import ConstantEnvironment
 
 BLACK = wf.Diffuse(0.0)
 ALBEDO = 0.5

@@ -2,8 +2,7 @@
 
 import numpy as np
 from hypothesis import strategies as st
-
-from wavefront.arrays.vec import f4
+from inside import f4
 
 POLES = np.array(
     [[0, 0, 1], [0, 0, -1], [0, -0.0, -1], [1e-30, 0, 1], [1e-4, 0, -1], [1, 0, 0], [0, 1, -0.0]]

@@ -12,6 +12,16 @@ import pytest
 import trimesh
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from inside import (
+    Accelerator,
+    Geometry,
+    NumpyAccelerator,
+    SceneError,
+    build_tree,
+    installed,
+    make_accelerator,
+    stable_order,
+)
 from rays import (
     PLACES,
     aimed_rays,
@@ -23,12 +33,6 @@ from rays import (
     same_bits,
     sphere_mesh,
 )
-
-from wavefront.accel import Accelerator, Geometry, make_accelerator
-from wavefront.accel.build import build_tree, stable_order
-from wavefront.accel.embree import installed
-from wavefront.accel.numpy_accel import NumpyAccelerator
-from wavefront.core.errors import SceneError
 
 f4 = np.float32
 NAMES = ["numpy", pytest.param("embree", marks=pytest.mark.skipif(not installed(), reason="no embreex"))]

@@ -9,10 +9,10 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 import trimesh
+from inside import make_accelerator
 from significance import render
 
 import wavefront as wf
-from wavefront.accel import make_accelerator
 
 
 def scene() -> wf.Scene:

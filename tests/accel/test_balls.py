@@ -2,17 +2,21 @@
 
 import numpy as np
 import pytest
+from inside import ARRAYS_ALL as ALL
+from inside import (
+    MOST,
+    BoundingBalls,
+    CapsulePrimitives,
+    CurvedPrimitives,
+    CylinderPrimitives,
+    Geometry,
+    NumpyAccelerator,
+    SpherePrimitives,
+    bounding_balls,
+)
 from rays import nothing, random_rays
 
 import wavefront as wf
-from wavefront.accel import Geometry
-from wavefront.accel.balls import MOST, BoundingBalls, bounding_balls
-from wavefront.accel.capsule import CapsulePrimitives
-from wavefront.accel.cylinder import CylinderPrimitives
-from wavefront.accel.numpy_accel import NumpyAccelerator
-from wavefront.accel.primitives import CurvedPrimitives
-from wavefront.accel.sphere import SpherePrimitives
-from wavefront.arrays.vec import ALL
 
 f4 = np.float32
 HERE = np.zeros(3)

@@ -4,10 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from inside import coplanar, installed, make_accelerator, triangle
 from rays import geometry, nothing, sphere_mesh
-
-from wavefront.accel import coplanar, make_accelerator, triangle
-from wavefront.accel.embree import installed
 
 f4 = np.float32
 NAMES = ["numpy", pytest.param("embree", marks=pytest.mark.skipif(not installed(), reason="no embreex"))]

@@ -2,12 +2,16 @@
 
 import numpy as np
 import pytest
+from inside import (
+    DeformingAccelerator,
+    Geometry,
+    NumpyAccelerator,
+    SpherePrimitives,
+    SweptSpheres,
+    SweptTriangles,
+)
 
 import wavefront as wf
-from wavefront.accel import Geometry
-from wavefront.accel.deforming import DeformingAccelerator, SweptSpheres, SweptTriangles
-from wavefront.accel.numpy_accel import NumpyAccelerator
-from wavefront.accel.sphere import SpherePrimitives
 
 N = 1500
 TIMES = np.array([1.0, 1.5, 3.0])

@@ -5,16 +5,20 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from inside import (
+    DistanceGridPrimitives,
+    Geometry,
+    NumpyAccelerator,
+    Rays,
+    _first_root,
+    compile_scene,
+    interaction,
+    intersect,
+    offset_origin,
+)
 from rays import check_batches, nothing
 
 import wavefront as wf
-from wavefront.accel import Geometry
-from wavefront.accel.distance_grid import DistanceGridPrimitives, _first_root
-from wavefront.accel.numpy_accel import NumpyAccelerator
-from wavefront.arrays.state import Rays
-from wavefront.features.compiling import compile_scene
-from wavefront.stages.interaction import interaction, offset_origin
-from wavefront.stages.intersect import intersect
 
 f4 = np.float32
 BOX = [(-1, -1, -1), (1, 1, 1)]

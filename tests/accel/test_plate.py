@@ -6,15 +6,21 @@ import pickle
 
 import numpy as np
 import pytest
+from inside import (
+    FACES,
+    Geometry,
+    NumpyAccelerator,
+    Plate,
+    PlateAccelerator,
+    RayCounter,
+    SpherePrimitives,
+    beside_plate,
+    plate,
+    surely_occluded,
+)
 from rays import random_rays, sphere_mesh
 
 import wavefront as wf
-from wavefront.accel import Geometry
-from wavefront.accel.counter import RayCounter
-from wavefront.accel.numpy_accel import NumpyAccelerator
-from wavefront.accel.plate import Plate, PlateAccelerator, beside_plate, surely_occluded
-from wavefront.accel.sphere import SpherePrimitives
-from wavefront.shapes.plate import FACES, plate
 
 f4 = np.float32
 TURNED = np.array([0.48, 0.6, 0.64])

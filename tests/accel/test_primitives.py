@@ -8,20 +8,24 @@ import trimesh
 from counting import calls
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from inside import (
+    CapsulePrimitives,
+    CurvedPrimitives,
+    CylinderPrimitives,
+    Geometry,
+    Hits,
+    NumpyAccelerator,
+    Rays,
+    SpherePrimitives,
+    compile_scene,
+    installed,
+    interaction,
+    make_accelerator,
+)
 from rays import check_batches, nothing, random_rays
 from strategies import seeds
 
 import wavefront as wf
-from wavefront.accel import Geometry, make_accelerator
-from wavefront.accel.capsule import CapsulePrimitives
-from wavefront.accel.cylinder import CylinderPrimitives
-from wavefront.accel.embree import installed
-from wavefront.accel.numpy_accel import NumpyAccelerator
-from wavefront.accel.primitives import CurvedPrimitives
-from wavefront.accel.sphere import SpherePrimitives
-from wavefront.arrays.state import Hits, Rays
-from wavefront.features.compiling import compile_scene
-from wavefront.stages.interaction import interaction
 
 f4 = np.float32
 ACCELS = ["numpy", pytest.param("embree", marks=pytest.mark.skipif(not installed(), reason="no embreex"))]

@@ -8,12 +8,18 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from inside import (
+    Accelerator,
+    Geometry,
+    are_parallelograms,
+    compile_scene,
+    corners,
+    find_quads,
+    make_accelerator,
+)
 from rays import PLACES, aimed_rays, brute_force, check_batches, geometry, nothing, random_rays
 
 import wavefront as wf
-from wavefront.accel import Accelerator, Geometry, make_accelerator
-from wavefront.accel.quads import are_parallelograms, corners, find_quads
-from wavefront.features.compiling import compile_scene
 
 f4 = np.float32
 SQUARE = np.array([(0.0, 0, 0), (1, 0, 0), (1, 1, 0), (0, 1, 0)])

@@ -4,11 +4,11 @@ from typing import Any
 
 import numpy as np
 import pytest
+from inside import BITS, MortonGrid
+from inside import scene as compilation
 from scenes import everything
 
 import wavefront as wf
-from wavefront.compile import scene as compilation
-from wavefront.compile.morton import BITS, MortonGrid
 
 
 def test_codes_interleave_the_bits_of_cells() -> None:

@@ -3,10 +3,10 @@
 import numpy as np
 import pytest
 from gltf_builder import TRIANGLE, Builder
+from inside import RENDER_OPTIONS, flow_times
 from significance import render
 
 import wavefront as wf
-from wavefront.cli.options import RENDER_OPTIONS, flow_times
 
 START, BEFORE, AFTER = 0.3, 0.15, 0.6
 BOTH = ("flow", "flow_back")

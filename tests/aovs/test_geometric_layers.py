@@ -3,11 +3,11 @@
 import numpy as np
 import pytest
 import trimesh
+from inside import installed
 from trimesh.ray.ray_triangle import RayMeshIntersector
 from trimesh.transformations import euler_matrix, translation_matrix
 
 import wavefront as wf
-from wavefront.accel.embree import installed
 
 GEOMETRIC = (
     "position",

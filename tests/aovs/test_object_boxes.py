@@ -3,10 +3,10 @@
 import numpy as np
 import pytest
 import trimesh
+from inside import installed
 from trimesh.transformations import translation_matrix
 
 import wavefront as wf
-from wavefront.accel.embree import installed
 
 CAMERA = wf.Camera.look_at((0, 1, 6), (0, 0, 0), fov=40, size=(60, 40))
 SKY = wf.Environment(1)

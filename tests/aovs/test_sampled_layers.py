@@ -6,15 +6,12 @@ from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
 import pytest
+from inside import AOVS, accumulate, albedo_of, emitted, intersect, intersect_and_compact
+from inside import BSDFS_ALL as ALL
 from scipy import stats
 from significance import ALPHA, render
 
 import wavefront as wf
-from wavefront.bsdfs import ALL, albedo_of
-from wavefront.film.aov_names import AOVS
-from wavefront.integrators import accumulate, intersect_and_compact
-from wavefront.stages.intersect import intersect
-from wavefront.stages.shade import emitted
 
 SAMPLED = tuple(name for name, layer in AOVS.items() if layer.sampled)
 EVERYTHING = (*SAMPLED, "light_groups", "coverage")

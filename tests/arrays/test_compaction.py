@@ -10,20 +10,27 @@ import scenes
 import strategies
 from hypothesis import given
 from hypothesis import strategies as st
+from inside import (
+    ROULETTE_AFTER,
+    Branches,
+    CompiledScene,
+    Frame,
+    Hits,
+    NumpyAccelerator,
+    Paths,
+    Program,
+    SurfaceInteraction,
+    broadcast,
+    compile_scene,
+    f4,
+    make_sampler,
+    normalize,
+    shading,
+)
+from inside import compact as stage
 from significance import render
 
 import wavefront as wf
-from wavefront.accel.numpy_accel import NumpyAccelerator
-from wavefront.arrays.frame import Frame
-from wavefront.arrays.state import Hits, Paths, SurfaceInteraction
-from wavefront.arrays.vec import broadcast, f4, normalize
-from wavefront.compile.program import Program
-from wavefront.compile.scene import ROULETTE_AFTER, CompiledScene
-from wavefront.features.branches import Branches
-from wavefront.features.compiling import compile_scene
-from wavefront.sampling.sampler import make_sampler
-from wavefront.stages import compact as stage
-from wavefront.stages.shade import shading
 
 SHAPES = {
     Paths: {"origin": 3, "direction": 3, "throughput": 3, "vertex": 3},

@@ -13,10 +13,10 @@ from typing import Any
 
 import numpy as np
 import pytest
+from inside import elementary
 from numpy._core._multiarray_umath import __cpu_dispatch__, __cpu_features__
 
 import wavefront
-from wavefront.arrays import elementary
 
 TESTS = Path(__file__).parents[1]
 PACKAGE = Path(wavefront.__file__).parent

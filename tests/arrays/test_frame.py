@@ -5,9 +5,7 @@ import pytest
 import strategies
 from hypothesis import given
 from hypothesis import strategies as st
-
-from wavefront.arrays.frame import Frame
-from wavefront.arrays.vec import cross, dot, f4, length, normalize
+from inside import Frame, cross, dot, f4, length, normalize
 
 CLOSE = 2e-6
 

@@ -5,34 +5,37 @@ The references read as their sources do, angles and all; the package's forms avo
 
 import numpy as np
 import pytest
-from scipy import special
-from scipy.stats import qmc
-
-from wavefront.arrays.state import SurfaceInteraction
-from wavefront.bsdfs import (
+from inside import BSDFS_METALS as METALS
+from inside import (
+    SIZE,
     Conductor,
     Dielectric,
     Diffuse,
     DiffuseTransmission,
+    Facets,
     Mirror,
     Mix,
     OrenNayar,
     Plastic,
     Principled,
+    SurfaceInteraction,
+    Tangent,
     ThinDielectric,
-)
-from wavefront.bsdfs.albedo import SIZE, cosine_mean, gloss_tables, lookup
-from wavefront.bsdfs.conductor import METALS
-from wavefront.bsdfs.microfacet import (
-    Facets,
     alpha_of,
+    boundary_tables,
+    cosine_mean,
+    fiber_density,
+    gloss_tables,
     is_smooth,
+    lookup,
+    part_escaping,
     reflect,
     refract,
+    sheen_albedo,
+    sheen_lobe,
 )
-from wavefront.bsdfs.plastic import boundary_tables, part_escaping
-from wavefront.bsdfs.rough import Tangent
-from wavefront.bsdfs.sheen import fiber_density, sheen_albedo, sheen_lobe
+from scipy import special
+from scipy.stats import qmc
 
 F4 = np.float32
 COLOR = (0.9, 0.5, 0.1)

@@ -4,12 +4,11 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from inside import BSDFS_ALL as ALL
+from inside import Facets, OpenPBRBsdf, check_bsdf
 from significance import render
 
 import wavefront as wf
-from wavefront.bsdfs import ALL, OpenPBRBsdf
-from wavefront.bsdfs.microfacet import Facets
-from wavefront.testing.bsdf import check_bsdf
 
 F4 = np.float32
 LAST = np.nextafter(F4(1), F4(0))

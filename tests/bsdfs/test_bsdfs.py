@@ -5,10 +5,8 @@ from collections.abc import Iterator
 
 import numpy as np
 import pytest
-
-from wavefront import bsdfs, testing
-from wavefront.arrays.state import SurfaceInteraction
-from wavefront.bsdfs import (
+from inside import (
+    BaseTexture,
     Conductor,
     Dielectric,
     Diffuse,
@@ -20,12 +18,14 @@ from wavefront.bsdfs import (
     OrenNayar,
     Plastic,
     Principled,
+    SceneError,
     Sides,
+    SurfaceInteraction,
     ThinDielectric,
     ThinDisney,
 )
-from wavefront.core.errors import SceneError
-from wavefront.textures.base import BaseTexture
+
+from wavefront import bsdfs, testing
 
 F4 = np.float32
 

@@ -2,11 +2,10 @@
 
 import numpy as np
 import pytest
+from inside import Dielectric, Diffuse, Mix, SurfaceInteraction
 from significance import assert_same_images, repeat
 
 import wavefront as wf
-from wavefront.arrays.state import SurfaceInteraction
-from wavefront.bsdfs import Dielectric, Diffuse, Mix
 from wavefront.testing import check_bsdf
 
 F4 = np.float32

@@ -2,9 +2,9 @@
 
 import numpy as np
 import pytest
+from inside import SurfaceInteraction
 
 import wavefront as wf
-from wavefront.arrays.state import SurfaceInteraction
 
 F4 = np.float32
 # cosine and azimuth of wo and wi

@@ -6,16 +6,30 @@ from typing import Any
 
 import numpy as np
 import pytest
+from inside import (
+    Bsdf,
+    Conductor,
+    Dielectric,
+    OpenPBRBsdf,
+    Plastic,
+    Principled,
+    RoughBsdf,
+    Shape,
+    ThinDielectric,
+    fresnel_dielectric,
+    gain,
+    loss,
+    mean_over_cosines,
+    part_kept,
+    reflect,
+    refract,
+    scalar,
+    scaling,
+)
 from scipy import stats
 from test_bsdfs import Constant, surface
 
 import wavefront as wf
-from wavefront.bsdfs import Bsdf, Conductor, Dielectric, OpenPBRBsdf, Plastic, Principled, ThinDielectric
-from wavefront.bsdfs.energy import Shape, gain, loss, mean_over_cosines, part_kept, scaling
-from wavefront.bsdfs.fresnel import fresnel_dielectric
-from wavefront.bsdfs.microfacet import reflect, refract
-from wavefront.bsdfs.rough import RoughBsdf
-from wavefront.textures.parameter import scalar
 
 F4 = np.float32
 SAMPLES = 10_000

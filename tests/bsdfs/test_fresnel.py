@@ -2,10 +2,7 @@
 
 import numpy as np
 import pytest
-
-from wavefront.arrays.state import SurfaceInteraction
-from wavefront.bsdfs import Dielectric
-from wavefront.bsdfs.fresnel import fresnel_conductor, fresnel_dielectric
+from inside import Dielectric, SurfaceInteraction, fresnel_conductor, fresnel_dielectric
 
 F4 = np.float32
 

@@ -5,10 +5,9 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from inside import OpenPBRBsdf, fuzz_albedo, fuzz_directions, fuzz_lobe
 from numpy.polynomial.polynomial import polyval2d
 
-from wavefront.bsdfs import OpenPBRBsdf
-from wavefront.bsdfs.fuzz import fuzz_albedo, fuzz_directions, fuzz_lobe
 from wavefront.testing import check_bsdf
 
 F4 = np.float32

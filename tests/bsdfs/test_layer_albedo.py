@@ -2,9 +2,9 @@
 
 import numpy as np
 import pytest
+from inside import albedo_of
 
 import wavefront as wf
-from wavefront.bsdfs import albedo_of
 
 f4 = np.float32
 COSINES = np.array([1.0, 0.8, 0.5, 0.2])

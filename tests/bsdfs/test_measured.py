@@ -5,14 +5,11 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from inside import BaseTexture, Conductor, Measured, normalize, spectrum_rgb
 from measurements import adaptive_fields, measured, merl_bytes, reflectance, spectral_fields, tensor_file
 
 import wavefront as wf
-from wavefront.arrays.vec import normalize
-from wavefront.bsdfs import Conductor, Measured
-from wavefront.colors.spectrum import spectrum_rgb
 from wavefront.testing import check_bsdf
-from wavefront.textures.base import BaseTexture
 
 F4 = np.float32
 KINDS = ["0", "1", "2", "4", "merl"]

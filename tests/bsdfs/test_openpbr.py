@@ -2,16 +2,21 @@
 
 import numpy as np
 import pytest
+from inside import (
+    OpenPBRBsdf,
+    OrenNayar,
+    SceneError,
+    dielectric_albedo,
+    film_reflectance,
+    fresnel_conductor,
+    fresnel_dielectric,
+    fuzz_albedo,
+    fuzz_lobe,
+    weighted_index,
+)
 from test_bsdfs import surface
 
 import wavefront as wf
-from wavefront.bsdfs import OpenPBRBsdf, OrenNayar
-from wavefront.bsdfs.albedo import dielectric_albedo
-from wavefront.bsdfs.fresnel import fresnel_conductor, fresnel_dielectric
-from wavefront.bsdfs.fuzz import fuzz_albedo, fuzz_lobe
-from wavefront.bsdfs.openpbr import weighted_index
-from wavefront.bsdfs.thin_film import film_reflectance
-from wavefront.core.errors import SceneError
 
 F4 = np.float32
 ANGLES = np.radians([0, 30, 60, 80])

@@ -2,10 +2,10 @@
 
 import numpy as np
 import pytest
+from inside import BsdfSample
 from significance import render
 
 import wavefront as wf
-from wavefront.bsdfs import BsdfSample
 
 
 class Paint(wf.Bsdf):

@@ -2,9 +2,9 @@
 
 import numpy as np
 import pytest
+from inside import installed
 
 import wavefront as wf
-from wavefront.accel.embree import installed
 
 CAMERA = wf.Camera.look_at((0, 4, 4), (0, 0, 0), fov=30, size=(24, 18))
 BLOCK = wf.Rectangle((-0.5, 0.6, -0.5), (0, 0, 1), (1, 0, 0), name="block")

@@ -3,18 +3,20 @@
 import numpy as np
 import pytest
 import trimesh
+from inside import (
+    bounce_sample,
+    compile_scene,
+    generate,
+    interaction,
+    intersect,
+    make_accelerator,
+    make_sampler,
+    shading,
+)
 from scipy import stats
 from significance import ALPHA, Mean, render
 
 import wavefront as wf
-from wavefront.accel import make_accelerator
-from wavefront.features.compiling import compile_scene
-from wavefront.sampling.sampler import make_sampler
-from wavefront.stages.bounce import bounce_sample
-from wavefront.stages.generate import generate
-from wavefront.stages.interaction import interaction
-from wavefront.stages.intersect import intersect
-from wavefront.stages.shade import shading
 
 CAMERA = wf.Camera.orthographic((0, 0.3, 5), (0, 0, 0), height=1.9, size=(24, 24))
 

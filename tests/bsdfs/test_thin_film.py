@@ -2,11 +2,20 @@
 
 import numpy as np
 import pytest
+from inside import BSDFS_SHARES as SHARES
+from inside import (
+    GAUSSIANS,
+    WHITE,
+    XYZ_TO_RGB,
+    Conductor,
+    Dielectric,
+    Principled,
+    SceneError,
+    film_reflectance,
+    fresnel_conductor,
+    fresnel_dielectric,
+)
 
-from wavefront.bsdfs import Conductor, Dielectric, Principled
-from wavefront.bsdfs.fresnel import fresnel_conductor, fresnel_dielectric
-from wavefront.bsdfs.thin_film import GAUSSIANS, SHARES, WHITE, XYZ_TO_RGB, film_reflectance
-from wavefront.core.errors import SceneError
 from wavefront.testing import check_bsdf
 
 F4 = np.float32

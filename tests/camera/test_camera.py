@@ -5,10 +5,10 @@ import pytest
 import strategies
 from hypothesis import given
 from hypothesis import strategies as st
+from inside import f4
 from significance import render
 
 import wavefront as wf
-from wavefront.arrays.vec import f4
 
 ORIGIN = np.zeros(3)
 

@@ -4,11 +4,10 @@ import pickle
 
 import numpy as np
 import pytest
+from inside import MAPPINGS, Polynomial, f4
 from significance import render
 
 import wavefront as wf
-from wavefront.arrays.vec import f4
-from wavefront.camera.mappings import MAPPINGS, Polynomial
 
 K = [[300, 4, 330], [0, 290, 250], [0, 0, 1]]
 TURN = np.array([[0.36, 0.48, -0.8], [-0.8, 0.6, 0.0], [0.48, 0.64, 0.6]])  # an exact rotation

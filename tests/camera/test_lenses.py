@@ -4,13 +4,9 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from inside import Orthographic, Panorama, Perspective, compile_scene, f4, generate, length, make_sampler
 
 import wavefront as wf
-from wavefront.arrays.vec import f4, length
-from wavefront.camera import Orthographic, Panorama, Perspective
-from wavefront.features.compiling import compile_scene
-from wavefront.sampling.sampler import make_sampler
-from wavefront.stages.generate import generate
 
 ORIGIN = np.zeros(3)
 TURN = np.array([[0.36, 0.48, -0.8], [-0.8, 0.6, 0.0], [0.48, 0.64, 0.6]])  # an exact rotation

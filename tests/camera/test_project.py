@@ -4,11 +4,10 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from inside import Distortion, f4
 from significance import render
 
 import wavefront as wf
-from wavefront.arrays.vec import f4
-from wavefront.camera.distortion import Distortion
 
 TURN = np.array([[0.36, 0.48, -0.8], [-0.8, 0.6, 0.0], [0.48, 0.64, 0.6]])  # an exact rotation
 K = np.array([[700.0, 0, 330], [0, 650, 250], [0, 0, 1]])

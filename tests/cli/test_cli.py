@@ -8,11 +8,10 @@ from importlib.metadata import version
 import imageio.v3 as iio
 import numpy as np
 import pytest
+from inside import main, read_image, render_command
 from luminaires import lm63
 
 import wavefront as wf
-from wavefront.cli import main, render_command
-from wavefront.codecs.images import read_image
 
 SQUARE = """
 mtllib square.mtl

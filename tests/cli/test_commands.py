@@ -12,12 +12,10 @@ from types import SimpleNamespace
 import imageio.v3 as iio
 import numpy as np
 import pytest
+from inside import EXTRAS, doctor_command, joined
 
 import wavefront as wf
 from wavefront import cli
-from wavefront.cli import doctor_command
-from wavefront.cli.doctor_command import EXTRAS
-from wavefront.cli.options import joined
 
 ROOT = Path(__file__).parents[2]
 DOCUMENT = (ROOT / "docs" / "command_line.md").read_text("utf-8")

@@ -4,11 +4,21 @@ import hashlib
 
 import numpy as np
 import pytest
+from inside import (
+    AGX_IN,
+    AGX_OUT,
+    NEUTRAL,
+    TONES,
+    XYZ_OF_RGB,
+    aces,
+    agx,
+    agx_punchy,
+    reinhard,
+    white_balance_matrix,
+)
 from pictures import with_everything
 
 import wavefront as wf
-from wavefront.codecs.tone import AGX_IN, AGX_OUT, TONES, aces, agx, agx_punchy, reinhard
-from wavefront.codecs.white_balance import NEUTRAL, XYZ_OF_RGB, white_balance_matrix
 
 CURVES = {"reinhard": reinhard, "aces": aces, "agx": agx, "agx_punchy": agx_punchy}
 SETTINGS = [

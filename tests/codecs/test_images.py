@@ -12,14 +12,20 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-
-from wavefront.codecs import hdr as rgbe
-from wavefront.codecs import png_jpeg as coded
-from wavefront.codecs.display import Display
-from wavefront.codecs.encoding import linear_to_srgb, srgb_to_linear, to_codes
-from wavefront.codecs.images import check_writable, read_image, write_image
-from wavefront.core import files
-from wavefront.core.errors import SaveError, SceneError
+from inside import (
+    Display,
+    SaveError,
+    SceneError,
+    check_writable,
+    files,
+    linear_to_srgb,
+    read_image,
+    srgb_to_linear,
+    to_codes,
+    write_image,
+)
+from inside import hdr as rgbe
+from inside import png_jpeg as coded
 
 
 @pytest.fixture

@@ -7,13 +7,11 @@ import zlib
 
 import numpy as np
 import pytest
+from inside import REC_709, decode_codes, hdr, npz, rgb_to_xyz, to_srgb
+from inside import codecs_Budget as Budget
 from PIL import Image as Pil
 
 import wavefront as wf
-from wavefront.codecs import hdr, npz
-from wavefront.codecs.budget import Budget
-from wavefront.codecs.images import decode_codes
-from wavefront.colors.primaries import REC_709, rgb_to_xyz, to_srgb
 
 RNG = np.random.default_rng(0)
 SIZE = 13, 9  # rows, columns

@@ -6,10 +6,10 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from inside import Photometry, luminaire_texts, parsed_luminaire
 from luminaires import GAMMA, SYMMETRIES, intensity, lm63
 
 import wavefront as wf
-from wavefront.codecs.luminaires import Photometry, luminaire_texts, parsed_luminaire
 
 DOWN, C0, C90 = -np.eye(3)[1], np.eye(3)[0], -np.eye(3)[2]  # of IESLight(..., (0, 0, 0)) in the scene
 

@@ -10,12 +10,10 @@ from typing import Any
 
 import numpy as np
 import pytest
+from inside import NAMED_MATERIALS, SETTINGS, Settings, colormaps
 
 import wavefront as wf
 from wavefront import cli
-from wavefront.colors import colormaps
-from wavefront.materials import NAMED_MATERIALS
-from wavefront.settings import SETTINGS, Settings
 
 ORANGE = [1, 0.2462013, 0]  # ((136/255 + 0.055)/1.055)^2.4 of #ff8800
 CORNERS, FACES = [(0, 0, 0), (1, 0, 0), (0, 1, 0)], [(0, 1, 2)]

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from inside import exact
 
 import wavefront as wf
-from wavefront.core.errors import exact
 
 
 @pytest.mark.parametrize(

@@ -11,9 +11,9 @@ from typing import Any
 
 import numpy as np
 import pytest
+from inside import fingerprint
 
 import wavefront as wf
-from wavefront.core.fingerprint import fingerprint
 
 
 def of(thing: Any) -> str:

@@ -6,12 +6,9 @@ import re
 import numpy as np
 import pytest
 import trimesh
+from inside import NAMED_MATERIALS, SYNONYMS, VIEWS, HenyeyGreenstein
 
 import wavefront as wf
-from wavefront.core.suggestions import SYNONYMS
-from wavefront.materials.named import NAMED_MATERIALS
-from wavefront.media import HenyeyGreenstein
-from wavefront.scene.scene import VIEWS
 
 BALL = wf.Sphere((0, 0, 0), 1)
 SCENE = wf.Scene(BALL)

@@ -9,10 +9,9 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from inside import plain, warn_caller, write_image
 
 import wavefront as wf
-from wavefront.codecs.images import write_image
-from wavefront.core.errors import plain, warn_caller
 
 LONG = "x" * 10_000_000
 ESCAPE = "\x1b[31m\x07\x9b\u202e"

@@ -9,9 +9,9 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from inside import npz_chunks, open_npz, read_array
 
 import wavefront as wf
-from wavefront.core.npz import npz_chunks, open_npz, read_array
 
 ARRAYS = {
     "text": np.array("a text: \u00e4\u4e16"),

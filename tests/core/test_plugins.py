@@ -5,9 +5,9 @@ from importlib.metadata import entry_points
 
 import numpy as np
 import pytest
+from inside import Registry
 
 import wavefront as wf
-from wavefront.core.registry import Registry
 
 CODE = """
 import numpy as np

@@ -1,8 +1,7 @@
 """Counts with their nouns."""
 
 import pytest
-
-from wavefront.core.plural import plural
+from inside import plural
 
 
 @pytest.mark.parametrize(

@@ -11,13 +11,10 @@ from types import SimpleNamespace
 
 import pytest
 import scenes
+from inside import DELAY, Bar, load, load_mesh, phase, prepared_scene, readers
+from inside import progress as module
 
 import wavefront as wf
-from wavefront.core import progress as module
-from wavefront.core.progress import DELAY, Bar, phase
-from wavefront.drive import prepared_scene
-from wavefront.io import readers
-from wavefront.io.load import load, load_mesh
 
 
 def wait_for(text: str, capsys) -> None:

@@ -5,9 +5,9 @@ import pickle
 
 import numpy as np
 import pytest
+from inside import SYNONYMS, meant, suggests_keywords
 
 import wavefront as wf
-from wavefront.core.suggestions import SYNONYMS, meant, suggests_keywords
 
 BALL = wf.Sphere((0, 0, 0), 1)
 TRIANGLE = [[0, 0, 0], [1, 0, 0], [0, 1, 0]], [[0, 1, 2]]

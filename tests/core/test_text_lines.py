@@ -1,10 +1,7 @@
 """Lines of text files: lines of the same form are checked once, and no line makes a file slow or large."""
 
 import pytest
-
-from wavefront.io import obj
-from wavefront.io.losses import Losses
-from wavefront.io.text_lines import NUMBER
+from inside import NUMBER, Losses, obj
 
 
 @pytest.mark.parametrize(

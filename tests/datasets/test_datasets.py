@@ -11,15 +11,12 @@ import imageio.v3 as iio
 import numpy as np
 import pytest
 import trimesh
+from inside import annotated_objects, dataset, diameter, mask_box, run_lengths, write_models
 from pycocotools.coco import COCO
 from pycocotools.mask import toBbox
 from trimesh.transformations import rotation_matrix, translation_matrix
 
 import wavefront as wf
-from wavefront.datasets import dataset
-from wavefront.datasets.annotated import annotated_objects
-from wavefront.datasets.masks import mask_box, run_lengths
-from wavefront.datasets.models import diameter, write_models
 
 # the ball and the plate of `scene`
 pytestmark = pytest.mark.filterwarnings("ignore:objects without a (model|pose)")

@@ -6,9 +6,9 @@ from pathlib import Path
 import imageio.v3 as iio
 import numpy as np
 import pytest
+from inside import kitti_file
 
 import wavefront as wf
-from wavefront.codecs.flow import kitti_file
 
 TIMES = [0.0, 0.2, 0.5]
 SIZE = (24, 18)

@@ -5,12 +5,11 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from inside import main, noisy_picture, without_holes
+from inside import open_image_denoise as module
 from significance import render
 
 import wavefront as wf
-from wavefront.cli import main
-from wavefront.denoising import open_image_denoise as module
-from wavefront.denoising.noisy import noisy_picture, without_holes
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[2] / "examples"))
 import gltf_scene

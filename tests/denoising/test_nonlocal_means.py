@@ -5,10 +5,9 @@ Every constant of the filter stands here once more, so none can change unnoticed
 
 import numpy as np
 import pytest
-
-from wavefront.denoising import nonlocal_means as module
-from wavefront.denoising.noisy import Guide, NoisyPicture
-from wavefront.denoising.nonlocal_means import nonlocal_means
+from inside import Guide, NoisyPicture
+from inside import denoising_nonlocal_means as module
+from inside import nonlocal_means_nonlocal_means as nonlocal_means
 
 SIZE = (9, 11)
 

@@ -6,9 +6,9 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from inside import Dimension, numbers_of
 
 import wavefront as wf
-from wavefront.sampling.sampler import Dimension, numbers_of
 
 
 class CameraFog(wf.Feature):

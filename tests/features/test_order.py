@@ -8,32 +8,42 @@ from typing import Any
 
 import numpy as np
 import pytest
+from inside import (
+    Absorption,
+    Alpha,
+    Backdrop,
+    Background,
+    BlackLights,
+    Caustics,
+    Deformations,
+    Dispersion,
+    Feature,
+    Glow,
+    Instances,
+    Interpolation,
+    Media,
+    Moments,
+    Motion,
+    Nested,
+    NormalMaps,
+    Passing,
+    Program,
+    Receivers,
+    ShadowCatchers,
+    ShadowTerminator,
+    SmoothNormals,
+    Unseen,
+    compile_scene,
+    compiling,
+    generate,
+    intersect,
+    intersect_and_compact,
+    make_accelerator,
+    make_sampler,
+    training,
+)
 
 import wavefront as wf
-from wavefront.accel import make_accelerator
-from wavefront.compile.program import Feature, Program
-from wavefront.features import compiling
-from wavefront.features.absorption import Absorption
-from wavefront.features.alpha import Alpha
-from wavefront.features.background import Backdrop, Background
-from wavefront.features.black_lights import BlackLights
-from wavefront.features.caustics import Caustics
-from wavefront.features.compiling import compile_scene
-from wavefront.features.dispersion import Dispersion
-from wavefront.features.instances import Instances
-from wavefront.features.interpolation import Interpolation, SmoothNormals
-from wavefront.features.media import Glow, Media
-from wavefront.features.motion import Deformations, Moments, Motion
-from wavefront.features.nested import Nested
-from wavefront.features.normal_maps import NormalMaps
-from wavefront.features.passing import Passing
-from wavefront.features.receivers import Receivers
-from wavefront.features.shadow_catchers import ShadowCatchers
-from wavefront.features.shadow_terminator import ShadowTerminator
-from wavefront.features.unseen import Unseen
-from wavefront.integrators import intersect, intersect_and_compact, training
-from wavefront.sampling.sampler import make_sampler
-from wavefront.stages.generate import generate
 
 CAMERA = wf.Camera.look_at((0, 3, 4), (0, 0, 0), fov=40, size=(10, 10))
 WAVES = wf.Texture((np.indices((16, 16)).sum(0) % 5 / 5)[..., None].astype(np.float32), srgb=False, channel=0)

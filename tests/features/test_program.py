@@ -4,13 +4,9 @@ import pickle
 
 import numpy as np
 import pytest
+from inside import Backdrop, Background, CompiledScene, Feature, Program, compile_scene, make_accelerator
 
 import wavefront as wf
-from wavefront.accel import make_accelerator
-from wavefront.compile.program import Feature, Program
-from wavefront.compile.scene import CompiledScene
-from wavefront.features.background import Backdrop, Background
-from wavefront.features.compiling import compile_scene
 
 BALL = wf.Sphere((0, 0, 0), 1)
 

@@ -3,17 +3,25 @@
 import numpy as np
 import pytest
 import trimesh
+from inside import (
+    MEMBERS,
+    FirstPoints,
+    NumpyAccelerator,
+    Rays,
+    ShadowTerminator,
+    SharedPoints,
+    attenuate,
+    compile_scene,
+    connect,
+    heights_of,
+    highest,
+    interaction,
+    intersect,
+    normalize,
+    shading,
+)
 
 import wavefront as wf
-from wavefront.accel.numpy_accel import NumpyAccelerator
-from wavefront.arrays.vec import highest, normalize
-from wavefront.features.compiling import compile_scene
-from wavefront.features.shadow_terminator import ShadowTerminator, heights_of
-from wavefront.sampling.tiles import MEMBERS
-from wavefront.stages.interaction import interaction
-from wavefront.stages.intersect import Rays, intersect
-from wavefront.stages.reuse import FirstPoints, SharedPoints, attenuate, connect
-from wavefront.stages.shade import shading
 
 SUN = wf.DirectionalLight((-1, -0.3, -0.2), 3.0)
 BALL = trimesh.creation.icosphere(2, 1.0)

@@ -4,10 +4,9 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from inside import accumulate, bounce_sample, intersect_and_compact, main, prepare_shading
 
 import wavefront as wf
-from wavefront.cli.command_line import main
-from wavefront.integrators import accumulate, bounce_sample, intersect_and_compact, prepare_shading
 
 PACKAGE = Path(wf.__file__).parent
 BALL, SKY = wf.Sphere((0, 0, 0), 1), wf.Environment(1.0)

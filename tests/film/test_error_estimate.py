@@ -7,14 +7,11 @@ import pytest
 import scenes
 from hypothesis import given
 from hypothesis import strategies as st
+from inside import FILM_OUTLIERS as OUTLIERS
+from inside import Film, Pass, PictureSums, batch_size, f4, film_image, passes
 from significance import render
 
 import wavefront as wf
-from wavefront.arrays.vec import f4
-from wavefront.drive.jobs import Pass, passes
-from wavefront.film.film import OUTLIERS, Film, batch_size
-from wavefront.film.picture_sums import PictureSums
-from wavefront.image.image import film_image
 
 
 def pixels(*indices: int) -> np.ndarray:

@@ -5,9 +5,7 @@ import math
 import numpy as np
 from hypothesis import given
 from hypothesis import strategies as st
-
-from wavefront.arrays.vec import f4
-from wavefront.film.exact_sum import WIDTH, ExactSums
+from inside import WIDTH, ExactSums, f4
 
 ALL = slice(None)
 numbers = st.floats(width=32, allow_nan=False, allow_infinity=False)

@@ -2,10 +2,9 @@
 
 import numpy as np
 import pytest
+from inside import Film, f4
 
 import wavefront as wf
-from wavefront.arrays.vec import f4
-from wavefront.film.film import Film
 
 
 def pixels(first: int, end: int) -> np.ndarray:

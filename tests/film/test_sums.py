@@ -4,12 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from inside import Sums, aov_sums, bytes_per_pixel, empty_sums, picture_memory
 
 import wavefront as wf
-from wavefront.drive.plan import picture_memory
-from wavefront.film import aov_sums
-from wavefront.film.picture_sums import empty_sums
-from wavefront.film.sums import Sums, bytes_per_pixel
 
 
 class Counts(Sums):

@@ -7,20 +7,33 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from inside import GUIDING_SHARES as SHARES
+from inside import GUIDING_SIDE as SIDE
+from inside import (
+    Dimension,
+    Frame,
+    Guidance,
+    GuideCells,
+    GuideTable,
+    Paths,
+    Records,
+    Shading,
+    SurfaceInteraction,
+    _best_shares,
+    bins_of,
+    broadcast,
+    build_table,
+    directions_at,
+    f4,
+    mix_with_guide,
+    neighbors,
+    solid_angles,
+    train,
+)
 from scenes import room
 from threadpoolctl import threadpool_info
 
 import wavefront as wf
-from wavefront.arrays.frame import Frame
-from wavefront.arrays.state import Paths, SurfaceInteraction
-from wavefront.arrays.vec import broadcast, f4
-from wavefront.guiding import GuideCells, GuideTable
-from wavefront.guiding.octahedral import bins_of, directions_at, neighbors, solid_angles
-from wavefront.guiding.training import SHARES, SIDE, Records, _best_shares, build_table
-from wavefront.integrators.training import train
-from wavefront.sampling.sampler import Dimension
-from wavefront.stages.guidance import mix_with_guide
-from wavefront.stages.shade import Guidance, Shading
 
 LARGE = GuideCells(np.zeros(3, f4), f4(1), 0)
 

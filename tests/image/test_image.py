@@ -6,10 +6,10 @@ import zlib
 import imageio.v3 as iio
 import numpy as np
 import pytest
+from inside import srgb_to_linear
 from significance import render
 
 import wavefront as wf
-from wavefront.codecs.encoding import srgb_to_linear
 
 GAMMAS = [2.2, 1.8, 1.0, "srgb"]
 CURVES = [

@@ -15,13 +15,11 @@ import zlib
 
 import numpy as np
 import pytest
+from inside import AOVS, from_named, png_jpeg, raster
 from pictures import HEIGHT, WIDTH, with_everything
 from PIL import Image as PillowImage
 
 import wavefront as wf
-from wavefront.codecs import png_jpeg, raster
-from wavefront.codecs.image_data import from_named
-from wavefront.film.aov_names import AOVS
 
 
 def arrays_of(image):

@@ -2,11 +2,9 @@
 
 import numpy as np
 import pytest
+from inside import linear_to_srgb, main, write_image
 
 import wavefront as wf
-from wavefront.cli import main
-from wavefront.codecs.encoding import linear_to_srgb
-from wavefront.codecs.images import write_image
 
 A = np.array([[[1.0, 2, 3], [1, 2, 3]], [[0, 0, 0], [4, 0, 1]]])
 B = np.array([[[1.0, 2, 3], [2, 2, 3]], [[0, 0, 0], [2, 0, 0]]])

@@ -2,9 +2,9 @@
 
 import numpy as np
 import pytest
+from inside import Image
 
 import wavefront as wf
-from wavefront.image import Image
 
 f4 = np.float32
 

@@ -5,11 +5,11 @@ import sys
 
 import numpy as np
 import pytest
+from inside import id_colors
 from matplotlib import pyplot
 from pictures import with_everything
 
 import wavefront as wf
-from wavefront.image.plot import id_colors
 
 pytestmark = pytest.mark.usefixtures("closed_figures")
 

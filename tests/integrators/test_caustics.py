@@ -20,14 +20,11 @@ import pytest
 import scenes
 from hypothesis import given
 from hypothesis import strategies as st
+from inside import LightSums, PointLightRecord, f4, tracing
 from significance import assert_same_images, repeat
 
 import wavefront as wf
 from wavefront import cli
-from wavefront.arrays.vec import f4
-from wavefront.drive import tracing
-from wavefront.film.light_sums import LightSums
-from wavefront.lights.point import PointLightRecord
 
 SIZE = (24, 18)
 PIXELS = SIZE[0] * SIZE[1]

@@ -6,11 +6,10 @@ from itertools import combinations
 import numpy as np
 import pytest
 import scenes
+from inside import Dimension, Sampler, make_sampler, steps
 from significance import Mean, assert_same_images, render, repeat
 
 import wavefront as wf
-from wavefront.integrators import steps
-from wavefront.sampling.sampler import Dimension, Sampler, make_sampler
 
 DIRECT_SPP = {"naive": 256, "direct_simple": 96, "direct_mis": 64, "full": 64}
 

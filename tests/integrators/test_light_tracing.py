@@ -11,21 +11,25 @@ from dataclasses import dataclass
 import numpy as np
 import pytest
 import trimesh
+from inside import (
+    Background,
+    CompiledScene,
+    Program,
+    Sampler,
+    SobolSampler,
+    SpecularSurfaces,
+    Splats,
+    compile_scene,
+    f4,
+    generate,
+    li_full,
+    trace_light,
+)
 from scenes import box, fresnel
 from scipy import stats
 from significance import ALPHA, smallest_p
 
 import wavefront as wf
-from wavefront.arrays.vec import f4
-from wavefront.compile.program import Program
-from wavefront.compile.scene import CompiledScene
-from wavefront.compile.specular_surfaces import SpecularSurfaces
-from wavefront.features.background import Background
-from wavefront.features.compiling import compile_scene
-from wavefront.integrators import li_full
-from wavefront.integrators.light_tracing import Splats, trace_light
-from wavefront.sampling.sampler import Sampler, SobolSampler
-from wavefront.stages.generate import generate
 
 WHITE = wf.Diffuse(0.7)
 GLASS = wf.Dielectric(1.5)

@@ -2,10 +2,10 @@
 
 import numpy as np
 import pytest
+from inside import branch
 
 import wavefront as wf
 from wavefront import integrators as steps
-from wavefront.stages.bounce import branch
 
 SCENE = wf.Scene(
     [wf.Sphere((0, 0, 0), 1), wf.Rectangle((-3, -1, 3), (6, 0, 0), (0, 0, -6))],

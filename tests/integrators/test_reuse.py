@@ -5,17 +5,21 @@ import importlib.util
 import numpy as np
 import pytest
 import scenes
+from inside import (
+    PictureTiles,
+    SobolSampler,
+    compile_scene,
+    generate,
+    li_reuse,
+    make_accelerator,
+    others_in_tile,
+    place_in_tiles,
+    reuse,
+)
 from scipy import stats
 from significance import Mean, assert_mean, assert_same_images, render, repeat
 
 import wavefront as wf
-from wavefront.accel import make_accelerator
-from wavefront.features.compiling import compile_scene
-from wavefront.integrators import li_reuse
-from wavefront.sampling.sampler import SobolSampler
-from wavefront.sampling.tiles import PictureTiles, others_in_tile, place_in_tiles
-from wavefront.stages import reuse
-from wavefront.stages.generate import generate
 
 # --- Tiles ----------------------------------------------------------------------------------------
 

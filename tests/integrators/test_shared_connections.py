@@ -11,26 +11,28 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-
-import wavefront as wf
-from wavefront.accel import make_accelerator
-from wavefront.arrays.state import Paths, SurfaceInteraction
-from wavefront.features.compiling import compile_scene
-from wavefront.guiding.cells import GuideCells
-from wavefront.guiding.guide_table import GuideTable
-from wavefront.sampling.tiles import MEMBERS as MEMBERS_OF_TILES
-from wavefront.sampling.tiles import PictureTiles, WaveTiles
-from wavefront.stages import reuse
-from wavefront.stages.reuse import (
+from inside import MEMBERS as MEMBERS_OF_TILES
+from inside import (
     FirstPoints,
+    Guidance,
+    GuideCells,
+    GuideTable,
+    Paths,
+    PictureTiles,
     SharedPoints,
+    SurfaceInteraction,
+    WaveTiles,
     _arriving,
     add_shared,
     as_shared,
     attenuate,
+    compile_scene,
     connect,
+    make_accelerator,
+    reuse,
 )
-from wavefront.stages.shade import Guidance
+
+import wavefront as wf
 
 f4 = np.float32
 some = settings(max_examples=settings.default.max_examples * 3 // 10)

@@ -9,18 +9,27 @@ from typing import Any
 
 import numpy as np
 import pytest
+from inside import (
+    BLOCKS,
+    SAMPLES,
+    RayCounter,
+    Run,
+    Settings,
+    SobolSampler,
+    choice,
+    compile_scene,
+    generate,
+    li_full,
+    li_twins,
+    pixels_of_tiles,
+    place_in_tiles,
+    tuning,
+    tuning_run,
+)
+from inside import INTEGRATORS_OUTLIERS as OUTLIERS
 from scenes import cornell_box, everything, room
 
 import wavefront as wf
-from wavefront.accel.counter import RayCounter
-from wavefront.drive import choice
-from wavefront.features.compiling import compile_scene
-from wavefront.integrators import li_full, tuning
-from wavefront.integrators.tuning import BLOCKS, OUTLIERS, SAMPLES, Run, li_twins, tuning_run
-from wavefront.sampling.sampler import SobolSampler
-from wavefront.sampling.tiles import pixels_of_tiles, place_in_tiles
-from wavefront.settings import Settings
-from wavefront.stages.generate import generate
 
 SIZE = (192, 192)  # the smallest pictures that get a tuning run
 

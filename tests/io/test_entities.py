@@ -5,11 +5,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-
-from wavefront.core.errors import SceneError
-from wavefront.io.description.conversion import Conversion
-from wavefront.io.description.entity import Entity, Table
-from wavefront.io.sources import SceneFiles
+from inside import Conversion, Entity, SceneError, SceneFiles, Table
 
 TABLE = Table("a format", harmless={"lamp": "watts"})
 TABLE.converts("lamp", "bulb", harmless="socket")(lambda entity: entity.number("lumen", 1.0))

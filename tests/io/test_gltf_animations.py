@@ -15,10 +15,9 @@ from typing import Any
 import numpy as np
 import pytest
 from gltf_builder import TRIANGLE, Builder
+from inside import SceneError, rotation
 
 import wavefront as wf
-from wavefront.core.errors import SceneError
-from wavefront.shapes.transform import rotation
 
 HALF = float(np.sqrt(0.5))
 Channels = list[tuple[int, str, str, Any, Any]]  # node, path, way, times, values

@@ -11,10 +11,9 @@ from typing import Any
 import numpy as np
 import pytest
 from gltf_builder import Builder
+from inside import SceneError, claimed
 
 import wavefront as wf
-from wavefront.core.errors import SceneError
-from wavefront.io.gltf.compression import claimed
 
 GRID = np.array([[x, y, x * y / 4] for y in range(4) for x in range(4)], np.float32)
 FACES = np.array(

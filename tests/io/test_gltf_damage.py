@@ -10,9 +10,9 @@ from typing import Any
 import numpy as np
 import pytest
 from gltf_builder import TRIANGLE, Builder
+from inside import Mesh
 
 import wavefront as wf
-from wavefront.shapes import Mesh
 
 CORNERS = np.array([0, 1, 2], np.uint16)
 Change = Callable[[Any], None]

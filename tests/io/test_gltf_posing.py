@@ -8,10 +8,9 @@ from typing import Any
 import numpy as np
 import pytest
 from gltf_builder import TRIANGLE, Builder
+from inside import Bend, RawMesh, Skin, pose
 
 import wavefront as wf
-from wavefront.io.gltf.posing import Bend, Skin, pose
-from wavefront.io.repair import RawMesh
 
 TURN = np.array([[0, -1, 0], [1, 0, 0], [0, 0, 1]])  # a quarter about z
 

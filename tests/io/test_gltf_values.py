@@ -8,9 +8,7 @@ import warnings
 import numpy as np
 import pytest
 from gltf_builder import TRIANGLE, Builder
-
-from wavefront.core.errors import SceneError
-from wavefront.io.load import load
+from inside import SceneError, load
 
 VALUES = (
     None, True, -1, 0, 1, 3, 1.5, 1e39, -1e39, 1e200, 1e308, 1e-320, float("nan"), float("inf"), 2**31,

@@ -7,17 +7,22 @@ import warnings
 import numpy as np
 import pytest
 import trimesh
+from inside import (
+    Camera,
+    Dielectric,
+    Diffuse,
+    Environment,
+    Mirror,
+    Scene,
+    SceneError,
+    VertexColors,
+    from_trimesh,
+    load,
+    load_mesh,
+    load_meshes,
+)
 
 from wavefront import render
-from wavefront.bsdfs.dielectric import Dielectric
-from wavefront.bsdfs.diffuse import Diffuse
-from wavefront.bsdfs.mirror import Mirror
-from wavefront.camera import Camera
-from wavefront.core.errors import SceneError
-from wavefront.io.load import from_trimesh, load, load_mesh, load_meshes
-from wavefront.lights import Environment
-from wavefront.scene import Scene
-from wavefront.textures.vertex_colors import VertexColors
 
 SQUARE = "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\n"
 

@@ -6,11 +6,8 @@ import zipfile
 import numpy as np
 import pytest
 import trimesh
+from inside import LoadLimits, SceneError, from_trimesh, load, load_mesh, load_meshes
 from PIL import Image
-
-from wavefront.core.errors import SceneError
-from wavefront.io.load import from_trimesh, load, load_mesh, load_meshes
-from wavefront.io.sources import LoadLimits
 
 OFF = "OFF # a comment\n4 2 0\n0 0 0\n1 0 0\n1 1 0\n\n0 1 0\n3 0 1 2\n3 0 2 3\n"
 

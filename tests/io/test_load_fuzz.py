@@ -25,18 +25,24 @@ import pytest
 import trimesh
 from file_damage import mutate
 from gltf_builder import Builder
+from inside import (
+    Cylinders,
+    Display,
+    IESLight,
+    ImageData,
+    SceneError,
+    Sphere,
+    Spheres,
+    load,
+    load_grid,
+    load_materialx,
+    load_points,
+    load_weather,
+    read_image,
+    read_picture,
+    write_image,
+)
 from PIL import Image as Pil
-
-from wavefront.codecs.display import Display
-from wavefront.codecs.image_data import ImageData
-from wavefront.codecs.images import read_image, read_picture, write_image
-from wavefront.core.errors import SceneError
-from wavefront.io.load import load
-from wavefront.io.materialx import load_materialx
-from wavefront.io.volumes import load_grid
-from wavefront.lights import IESLight
-from wavefront.measuring import load_points, load_weather
-from wavefront.shapes import Cylinders, Sphere, Spheres
 
 MEMORY = 3 << 30  # bytes
 SECONDS = 25  # for one file

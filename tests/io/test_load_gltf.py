@@ -13,23 +13,32 @@ import trimesh
 from counting import calls
 from expected import Near, check
 from gltf_builder import TRIANGLE, Builder
+from inside import (
+    KNOWN,
+    Dielectric,
+    Diffuse,
+    DirectionalLight,
+    Instance,
+    LoadLimits,
+    Material,
+    Mesh,
+    NormalMap,
+    SceneError,
+    SpotLight,
+    SurfaceInteraction,
+    Texture,
+    ThinDielectric,
+    VertexColors,
+    from_trimesh,
+    load,
+    load_mesh,
+    load_meshes,
+    placing,
+    srgb_to_linear,
+)
+from inside import document as gltf_document
 
 from wavefront import Camera, Scene, render
-from wavefront.arrays.state import SurfaceInteraction
-from wavefront.bsdfs import Dielectric, Diffuse, ThinDielectric
-from wavefront.codecs.encoding import srgb_to_linear
-from wavefront.core.errors import SceneError
-from wavefront.io.description import placing
-from wavefront.io.gltf import document as gltf_document
-from wavefront.io.gltf.materials import KNOWN
-from wavefront.io.load import from_trimesh, load, load_mesh, load_meshes
-from wavefront.io.sources import LoadLimits
-from wavefront.lights import DirectionalLight, SpotLight
-from wavefront.materials import Material
-from wavefront.shapes import Instance, Mesh
-from wavefront.textures.image import Texture
-from wavefront.textures.normal_map import NormalMap
-from wavefront.textures.vertex_colors import VertexColors
 
 
 @pytest.fixture

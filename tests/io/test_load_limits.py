@@ -15,13 +15,9 @@ from typing import Any
 import numpy as np
 import pytest
 import trimesh
+from inside import Losses, SceneFiles, load_meshes, obj, write_image
 
 import wavefront as wf
-from wavefront.codecs.images import write_image
-from wavefront.io import obj
-from wavefront.io.load import load_meshes
-from wavefront.io.losses import Losses
-from wavefront.io.sources import SceneFiles
 
 OBJ = "mtllib {library}\nv 0 0 0\nv 1 0 0\nv 0 1 0\nvt 0 0\nvt 1 0\nvt 0 1\nusemtl m\nf 1/1 2/2 3/3\n"
 

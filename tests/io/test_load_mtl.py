@@ -7,14 +7,19 @@ import imageio.v3 as iio
 import numpy as np
 import pytest
 import trimesh
+from inside import (
+    BumpMap,
+    Dielectric,
+    Diffuse,
+    NormalMap,
+    Principled,
+    SceneError,
+    Texture,
+    from_trimesh,
+    load_meshes,
+    write_image,
+)
 from PIL import Image as Pil
-
-from wavefront.bsdfs import Dielectric, Diffuse, Principled
-from wavefront.codecs.images import write_image
-from wavefront.core.errors import SceneError
-from wavefront.io.load import from_trimesh, load_meshes
-from wavefront.textures.image import Texture
-from wavefront.textures.normal_map import BumpMap, NormalMap
 
 CODES = np.random.default_rng(0).integers(0, 256, (4, 8, 3), np.uint8)
 POINTS = np.random.default_rng(1).random((2, 40), np.float32)

@@ -10,10 +10,9 @@ from typing import Any
 
 import numpy as np
 import pytest
+from inside import Losses, warn_caller
 
 import wavefront as wf
-from wavefront.core.errors import warn_caller
-from wavefront.io.losses import Losses
 
 OBJ = "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n"
 

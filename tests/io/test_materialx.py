@@ -2,9 +2,9 @@
 
 import numpy as np
 import pytest
+from inside import Texture
 
 import wavefront as wf
-from wavefront.textures.image import Texture
 
 pytest.importorskip("MaterialX")
 HEAD = '<?xml version="1.0"?><materialx version="1.39" colorspace="lin_rec709">'

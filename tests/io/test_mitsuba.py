@@ -15,17 +15,13 @@ from typing import Any
 import numpy as np
 import pytest
 from expected import Near, check
+from inside import FILTERS as FILTERS_HERE
+from inside import NODES_TABLE as TABLE
+from inside import Entity, RawMesh, blackbody_spectrum, facing, spectrum_rgb, write_image
+from inside import io_Job as Job
 from measurements import adaptive_fields, tensor_file
 
 import wavefront as wf
-from wavefront.codecs.images import write_image
-from wavefront.colors.spectrum import blackbody_spectrum, spectrum_rgb
-from wavefront.io.description.entity import Entity
-from wavefront.io.description.placing import facing
-from wavefront.io.mitsuba import convert as _  # noqa: F401  fills the table
-from wavefront.io.mitsuba.nodes import TABLE, Job
-from wavefront.io.repair import RawMesh
-from wavefront.sampling.filters import FILTERS as FILTERS_HERE
 
 PLUGINS = {name: each for (kind, name), each in TABLE.makers.items()}
 OBJ = "v 0 0 0\nv 1 0 0\nv 0 1 0\nvt 0 0\nvt 1 0\nvt 0 1\nf 1/1 2/2 3/3\n"

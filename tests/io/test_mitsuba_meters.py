@@ -7,12 +7,9 @@ from typing import Any
 
 import numpy as np
 import pytest
+from inside import Y_INTEGRAL, Sensors, cie_function, main
 
 import wavefront as wf
-from wavefront.camera import Sensors
-from wavefront.cli import main
-from wavefront.colors.spectrum import Y_INTEGRAL
-from wavefront.lights.sky_functions import cie_function
 
 BLACK = {"type": "diffuse", "reflectance": 0.0}
 METER = {"type": "irradiancemeter"}

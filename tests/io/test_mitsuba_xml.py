@@ -9,11 +9,9 @@ from typing import Any
 import numpy as np
 import pytest
 from counting import calls
+from inside import Document, SceneFiles, main
 
 import wavefront as wf
-from wavefront.cli.command_line import main
-from wavefront.io.mitsuba.document import Document
-from wavefront.io.sources import SceneFiles
 
 BALL = "<shape type='sphere'/>"
 

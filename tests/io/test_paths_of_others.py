@@ -7,11 +7,10 @@ import warnings
 
 import numpy as np
 import pytest
+from inside import SceneError, SceneFiles
 from PIL import Image as Pil
 
 import wavefront as wf
-from wavefront.core.errors import SceneError
-from wavefront.io.sources import SceneFiles
 
 RED = (1.0, 0.0, 0.0)
 FACE = "v 0 0 0\nv 1 0 0\nv 0 1 0\nvt 0 0\nvt 1 0\nvt 0 1\nusemtl m\nf 1/1 2/2 3/3\n"

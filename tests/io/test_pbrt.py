@@ -11,15 +11,12 @@ import numpy as np
 import pytest
 import trimesh
 from expected import Near, check
+from inside import ENTITIES_TABLE as TABLE
+from inside import IO_METALS as METALS
+from inside import luminance, noise, sphere_to_square, square_to_sphere, write_image
 from measurements import adaptive_fields, tensor_file
 
 import wavefront as wf
-from wavefront.arrays.vec import luminance
-from wavefront.codecs.images import write_image
-from wavefront.io.pbrt.entities import TABLE
-from wavefront.io.pbrt.lights import sphere_to_square, square_to_sphere
-from wavefront.io.pbrt.noise import noise
-from wavefront.io.spectra import METALS
 
 BALL = 'Shape "sphere"\n'
 SQUARE = 'Shape "trianglemesh" "point3 P" [ 0 0 0 1 0 0 1 1 0 0 1 0 ] "integer indices" [ 0 1 2 0 2 3 ]\n'

@@ -13,13 +13,9 @@ from typing import Any
 import numpy as np
 import pytest
 from counting import calls
+from inside import SceneError, SceneFiles, Statement, main, statements, write_image
 
 import wavefront as wf
-from wavefront.cli.command_line import main
-from wavefront.codecs.images import write_image
-from wavefront.core.errors import SceneError
-from wavefront.io.pbrt.parser import Statement, statements
-from wavefront.io.sources import SceneFiles
 
 BALL = 'Shape "sphere"\n'
 POINT = 'Shape "trianglemesh" "point3 P" [ 1 2 3  1 3 3  2 2 3 ]\n'  # the first vertex is (1, 2, 3)

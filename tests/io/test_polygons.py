@@ -5,10 +5,7 @@ import warnings
 
 import numpy as np
 import pytest
-
-from wavefront.io.load import load, load_mesh
-from wavefront.io.polygons import fans, fans_by_size, triangulate, turned_fans
-from wavefront.io.pyvista.objects import from_pyvista
+from inside import fans, fans_by_size, from_pyvista, load, load_mesh, triangulate, turned_fans
 
 L = [(-1, -1), (1, -1), (1, 0), (0, 0), (0, 1), (-1, 1)]
 DART = [(-1, -1), (0, -0.5), (1, -1), (0, 1)]

@@ -12,10 +12,10 @@ import matplotlib
 import numpy as np
 import pytest
 import trimesh
+from inside import color_map
 from significance import render
 
 import wavefront as wf
-from wavefront.colors.maps import color_map
 
 SIDE = 9
 X, Y = np.meshgrid(np.linspace(-0.5, 0.5, SIDE), np.linspace(-0.5, 0.5, SIDE))

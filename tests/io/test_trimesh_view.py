@@ -5,11 +5,11 @@ import warnings
 import numpy as np
 import pytest
 import trimesh
+from inside import from_trimesh
 from trimesh.scene import cameras, lighting
 from trimesh.transformations import rotation_matrix, translation_matrix
 
 import wavefront as wf
-from wavefront.io.load import from_trimesh
 
 UP = rotation_matrix(np.pi / 2, (1, 0, 0))  # -z becomes y
 

@@ -10,9 +10,9 @@ from typing import Any
 import numpy as np
 import pytest
 from expected import Near, check
+from inside import write_image
 
 import wavefront as wf
-from wavefront.codecs.images import write_image
 
 TRIANGLE = """int[] faceVertexCounts = [4]
     int[] faceVertexIndices = [0, 1, 2, 3]

@@ -10,10 +10,10 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from inside import CHILD, Child
 from scripts import children, eventually, runs, start_python, wait_for
 
 import wavefront as wf
-from wavefront.io.usd.child import CHILD, Child
 
 pytest.importorskip("pxr")
 H = "#usda 1.0\n"

@@ -7,10 +7,9 @@ from typing import Any
 
 import numpy as np
 import pytest
+from inside import Losses, write_image
 
 import wavefront as wf
-from wavefront.codecs.images import write_image
-from wavefront.io.losses import Losses
 
 pytest.importorskip("pxr")
 SQUARE = """int[] faceVertexCounts = [4]

@@ -4,9 +4,9 @@ import itertools
 
 import numpy as np
 import pytest
+from inside import openvdb
 
 import wavefront as wf
-from wavefront.io.volume_libraries import openvdb
 
 GRID = np.random.default_rng(1).random((4, 3, 2)).astype(np.float32)  # z, y, x
 COLORS = np.random.default_rng(2).random((4, 3, 2, 3)).astype(np.float32)

@@ -6,24 +6,24 @@ import pytest
 from gltf_builder import Builder
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from scenes import ALBEDO, ALL, BLACK, EYE, HERE, floor, polygon_irradiance, probe
-from significance import SIDE, assert_mean, assert_same_images, measure, render, repeat
-
-import wavefront as wf
-from wavefront import testing
-from wavefront.accel import make_accelerator
-from wavefront.arrays.vec import f4
-from wavefront.features.compiling import compile_scene
-from wavefront.lights import (
+from inside import (
+    BaseTexture,
     LightTable,
     RectangleLights,
     TriangleLights,
     TwoSidedRectangleLights,
     TwoSidedTexturedTriangleLights,
     TwoSidedTriangleLights,
+    compile_scene,
+    f4,
+    make_accelerator,
+    textured_emission,
 )
-from wavefront.lights import textured_emission as textured_emission
-from wavefront.textures.base import BaseTexture
+from scenes import ALBEDO, ALL, BLACK, EYE, HERE, floor, polygon_irradiance, probe
+from significance import SIDE, assert_mean, assert_same_images, measure, render, repeat
+
+import wavefront as wf
+from wavefront import testing
 
 RNG = np.random.default_rng(0)
 LOW, HIGH, Y = (-0.5, -0.4), (0.6, 0.7), 2.0

@@ -4,18 +4,21 @@ import numpy as np
 import pytest
 import strategies
 from hypothesis import given
+from inside import (
+    ConstantEnvironment,
+    Display,
+    EnvironmentSum,
+    NumpyAccelerator,
+    compile_scene,
+    f4,
+    srgb_to_linear,
+    write_image,
+)
 from scenes import ALBEDO, BLACK, EYE, HERE, floor, panel, probe
 from significance import SIDE, Mean, assert_mean, assert_same_images, measure, render, repeat
 
 import wavefront as wf
 from wavefront import testing
-from wavefront.accel.numpy_accel import NumpyAccelerator
-from wavefront.arrays.vec import f4
-from wavefront.codecs.display import Display
-from wavefront.codecs.encoding import srgb_to_linear
-from wavefront.codecs.images import write_image
-from wavefront.features.compiling import compile_scene
-from wavefront.lights import ConstantEnvironment, EnvironmentSum
 
 ORIGIN = np.zeros(3)
 SAMPLING = ("direct_simple", "direct_mis", "full")

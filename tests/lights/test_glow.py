@@ -2,12 +2,12 @@
 
 import numpy as np
 import pytest
+from inside import GlowLights
 from scenes import probe
 from scipy import stats
 from significance import ALPHA, Mean, assert_mean, measure
 
 import wavefront as wf
-from wavefront.lights import GlowLights
 
 BOX = np.array([(-0.5, 0.3, -0.4), (0.5, 1.1, 0.6)])
 FLOOR = wf.Rectangle((-9, 0, 9), (18, 0, 0), (0, 0, -18), material=wf.Diffuse(0.8))

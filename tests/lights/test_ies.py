@@ -6,16 +6,13 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from inside import IESLights, compile_scene, f4, make_accelerator
 from luminaires import GAMMA, intensity, lm63, write
 from scenes import ALBEDO, EYE, floor, probe
 from significance import measure, render
 
 import wavefront as wf
 from wavefront import testing
-from wavefront.accel import make_accelerator
-from wavefront.arrays.vec import f4
-from wavefront.features.compiling import compile_scene
-from wavefront.lights import IESLights
 
 ORIGIN = np.zeros(3)
 

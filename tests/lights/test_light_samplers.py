@@ -5,16 +5,23 @@ from unittest.mock import patch
 
 import numpy as np
 import pytest
+from inside import (
+    BY_POWER,
+    Emitters,
+    LightSampler,
+    LightTable,
+    PointLightRecord,
+    Receiver,
+    SpatialLightSampler,
+    TriangleLights,
+    chi_square,
+    f4,
+    fingerprint,
+    samplers,
+)
 from significance import assert_same_images, repeat
 
 import wavefront as wf
-from wavefront.arrays.vec import f4
-from wavefront.core.fingerprint import fingerprint
-from wavefront.lights import LightTable, PointLightRecord, Receiver, TriangleLights, samplers
-from wavefront.lights.base import Emitters
-from wavefront.lights.choice import LightSampler
-from wavefront.lights.grid import BY_POWER, SpatialLightSampler
-from wavefront.testing.chi2 import chi_square
 
 
 def two_points() -> LightTable:

@@ -6,21 +6,25 @@ from functools import cache
 
 import numpy as np
 import pytest
-
-import wavefront as wf
-from wavefront.arrays.soa import soa
-from wavefront.arrays.vec import Floats, f4
-from wavefront.lights import (
+from inside import (
+    Emitters,
+    Floats,
+    HalvedLightSampler,
+    LightRecord,
+    LightSample,
     LightTable,
+    LightTreeSampler,
     PointLightRecord,
     Receiver,
+    SubsetLightSampler,
     TriangleLights,
+    chi_square,
+    f4,
     samplers,
+    soa,
 )
-from wavefront.lights.base import Emitters, LightRecord, LightSample
-from wavefront.lights.samplers import HalvedLightSampler, SubsetLightSampler
-from wavefront.lights.tree import LightTreeSampler
-from wavefront.testing.chi2 import chi_square
+
+import wavefront as wf
 
 LARGEST = 1 - 2.0**-24  # of all u
 

@@ -3,11 +3,10 @@
 import numpy as np
 import pytest
 import scenes
+from inside import ConstantEnvironment, LightTable, PointLightRecord, SphereLights, TriangleLights, f4
 from significance import assert_mean, measure, render
 
 import wavefront as wf
-from wavefront.arrays.vec import f4
-from wavefront.lights import ConstantEnvironment, LightTable, PointLightRecord, SphereLights, TriangleLights
 
 RNG = np.random.default_rng(1)
 

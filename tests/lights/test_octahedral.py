@@ -7,14 +7,12 @@ from functools import cache
 
 import numpy as np
 import pytest
+from inside import LIGHTS_SIDE as SIDE
+from inside import PRESETS, SHARP, OctahedralEnvironment, Receiver, _directions, _texels, f4
 from scipy import stats
 from significance import assert_same_images, repeat
 
 import wavefront as wf
-from wavefront.arrays.vec import f4
-from wavefront.lights import Receiver
-from wavefront.lights.octahedral import SHARP, SIDE, OctahedralEnvironment, _directions, _texels
-from wavefront.scene.lighting import PRESETS
 
 NORMALS = [(0, 1, 0), (0, -1, 0), (1, 0, 0), (-0.6, 0.48, 0.64), None]
 

@@ -7,12 +7,10 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from inside import LightTable, LightTreeSampler, chi_square
 from significance import assert_same_images, repeat
 
 import wavefront as wf
-from wavefront.lights import LightTable
-from wavefront.lights.tree import LightTreeSampler
-from wavefront.testing.chi2 import chi_square
 
 PAGE = (Path(__file__).parents[2] / "docs" / "lights.md").read_text("utf-8")
 everywhere = pytest.mark.parametrize("integrator", ["naive", "direct_simple", "direct_mis", "full"])

@@ -5,11 +5,7 @@ from functools import cache
 import numpy as np
 import pytest
 import scenes
-from significance import assert_same_images, repeat
-
-import wavefront as wf
-from wavefront.arrays.vec import f4
-from wavefront.lights import (
+from inside import (
     LightRecord,
     Receiver,
     RectangleLights,
@@ -17,7 +13,11 @@ from wavefront.lights import (
     TexturedTriangleLights,
     TriangleLights,
     TwoSidedRectangleLights,
+    f4,
 )
+from significance import assert_same_images, repeat
+
+import wavefront as wf
 
 WHITE = np.ones((3, 1), f4)
 SETTINGS: dict = {"max_bounces": 3, "accel": "numpy"}

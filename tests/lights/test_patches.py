@@ -2,10 +2,10 @@
 
 import numpy as np
 import pytest
+from inside import PatchedEnvironment, SkyPatches
 
 import wavefront as wf
 from wavefront import testing
-from wavefront.lights import PatchedEnvironment, SkyPatches
 
 AXES = np.array([[0, 1, 0], [1, 0, 0], [0, 0, 1]], float).T  # y north, x east, z up
 

@@ -7,21 +7,23 @@ from functools import cache
 import numpy as np
 import pytest
 import scenes
+from inside import (
+    NO_NORMAL,
+    CosineProduct,
+    EnvironmentSum,
+    LightRecord,
+    NumpyAccelerator,
+    Receiver,
+    TexelProduct,
+    compile_scene,
+    f4,
+    octahedral_bins,
+    octahedral_normals,
+)
 from significance import assert_same_images, repeat
 
 import wavefront as wf
 from wavefront import testing
-from wavefront.accel.numpy_accel import NumpyAccelerator
-from wavefront.arrays.vec import f4
-from wavefront.features.compiling import compile_scene
-from wavefront.lights import EnvironmentSum, LightRecord, Receiver
-from wavefront.lights.product import (
-    NO_NORMAL,
-    CosineProduct,
-    TexelProduct,
-    octahedral_bins,
-    octahedral_normals,
-)
 
 SETTINGS: dict = {"max_bounces": 3, "accel": "numpy"}
 NORMALS = [(0, 1, 0), (0, -1, 0), (1, 0, 0), (-0.6, 0.48, 0.64), (0.1, -0.2, -0.97)]

@@ -2,12 +2,12 @@
 
 import numpy as np
 import pytest
+from inside import f4
 from scenes import EYE, floor, probe
 from significance import measure
 
 import wavefront as wf
 from wavefront import testing
-from wavefront.arrays.vec import f4
 
 ORIGIN = np.zeros(3)
 QUARTERS = wf.Texture(

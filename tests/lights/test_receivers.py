@@ -8,14 +8,7 @@ from inspect import isabstract
 import luminaires
 import numpy as np
 import pytest
-from significance import render
-from test_panels import NORMALS, WHITE, receiver, rectangle, sphere, triangle
-
-import wavefront as wf
-from wavefront import lights, testing
-from wavefront.arrays.vec import f4
-from wavefront.codecs.luminaires import Photometry
-from wavefront.lights import (
+from inside import (
     ConstantEnvironment,
     DirectionalLights,
     EnvironmentSum,
@@ -23,7 +16,9 @@ from wavefront.lights import (
     IESLights,
     ImageEnvironment,
     LightRecord,
+    OctahedralEnvironment,
     PatchedEnvironment,
+    Photometry,
     PicturedLights,
     PointLightRecord,
     RectangleLights,
@@ -38,9 +33,14 @@ from wavefront.lights import (
     TwoSidedRectangleLights,
     TwoSidedTexturedTriangleLights,
     TwoSidedTriangleLights,
+    Web,
+    f4,
 )
-from wavefront.lights.ies import Web
-from wavefront.lights.octahedral import OctahedralEnvironment
+from significance import render
+from test_panels import NORMALS, WHITE, receiver, rectangle, sphere, triangle
+
+import wavefront as wf
+from wavefront import lights, testing
 
 ORIGIN = np.zeros(3)
 

@@ -2,12 +2,17 @@
 
 import numpy as np
 import pytest
+from inside import (
+    RectangleLights,
+    TriangleLights,
+    TwoSidedRectangleLights,
+    compile_scene,
+    f4,
+    first_of_pairs,
+    make_accelerator,
+)
 
 import wavefront as wf
-from wavefront.accel import make_accelerator
-from wavefront.arrays.vec import f4
-from wavefront.features.compiling import compile_scene
-from wavefront.lights import RectangleLights, TriangleLights, TwoSidedRectangleLights, first_of_pairs
 
 WHITE = np.ones((3, 1), f4)
 

@@ -6,13 +6,13 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from inside import hosek_wilkie, sky_functions
 from scenes import ALBEDO, EYE, HERE, floor, probe
 from significance import assert_mean, measure
 from sky_values import dome, standard
 
 import wavefront as wf
 from wavefront import testing
-from wavefront.lights import hosek_wilkie, sky_functions
 
 ORIGIN = np.zeros(3)
 TYPES = range(1, 17)

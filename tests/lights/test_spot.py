@@ -8,12 +8,12 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from inside import f4
 from scenes import ALBEDO, EYE, floor, probe
 from significance import SIDE, measure, render
 
 import wavefront as wf
 from wavefront import testing
-from wavefront.arrays.vec import f4
 
 ORIGIN = np.zeros(3)
 

@@ -2,11 +2,9 @@
 
 import numpy as np
 import pytest
+from inside import Absorption, compile_scene, make_accelerator
 
 import wavefront as wf
-from wavefront.accel import make_accelerator
-from wavefront.features.absorption import Absorption
-from wavefront.features.compiling import compile_scene
 
 ABSORPTION = np.array([0.2, 1.0, 3.0])
 

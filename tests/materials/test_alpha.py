@@ -4,13 +4,11 @@ import imageio.v3 as iio
 import numpy as np
 import pytest
 from gltf_builder import Builder
+from inside import Principled, installed, sampler
 from scenes import ALBEDO, ALL, BLACK, EYE, HERE, floor, panel, polygon_irradiance, probe
 from significance import SIDE, assert_mean, assert_same_images, measure, render, repeat
 
 import wavefront as wf
-from wavefront.accel.embree import installed
-from wavefront.bsdfs import Principled
-from wavefront.sampling import sampler
 
 NO_EMBREE = pytest.mark.skipif(not installed(), reason="no embreex")
 ACCELERATORS = ["numpy", pytest.param("embree", marks=NO_EMBREE)]

@@ -4,13 +4,10 @@ from typing import Any
 
 import numpy as np
 import pytest
+from inside import Alpha, CompiledScene, compile_scene, make_accelerator
 from significance import render
 
 import wavefront as wf
-from wavefront.accel import make_accelerator
-from wavefront.compile.scene import CompiledScene
-from wavefront.features.alpha import Alpha
-from wavefront.features.compiling import compile_scene
 
 TRIANGLE = (np.eye(3), [[0, 1, 2]])
 CAMERA = wf.Camera.look_at((0, 0, 5), (0, 0, 0), fov=30, size=(8, 8))

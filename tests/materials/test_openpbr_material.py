@@ -4,9 +4,9 @@ import inspect
 
 import numpy as np
 import pytest
+from inside import OpenPBRBsdf
 
 import wavefront as wf
-from wavefront.bsdfs.openpbr import OpenPBRBsdf
 
 
 def test_the_defaults_are_those_of_the_bsdf():

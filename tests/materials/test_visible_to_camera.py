@@ -6,12 +6,10 @@ from typing import Any
 
 import numpy as np
 import pytest
+from inside import Unseen, compile_scene, make_accelerator
 from scenes import ALL
 
 import wavefront as wf
-from wavefront.accel import make_accelerator
-from wavefront.features.compiling import compile_scene
-from wavefront.features.unseen import Unseen
 
 SIZE = (12, 12)
 UNSEEN = wf.Material(wf.Diffuse(0.3), visible_to_camera=False)

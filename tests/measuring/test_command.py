@@ -6,9 +6,9 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from inside import main
 
 import wavefront as wf
-from wavefront.cli import main
 
 OBJ = "v -1 -1 0\nv 1 -1 0\nv 0 1 0\nf 1 2 3\n"
 GRID = "-1,-1,0:2,0,0:0,2,0:3x2"

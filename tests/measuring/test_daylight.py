@@ -4,9 +4,9 @@ from datetime import UTC, datetime
 
 import numpy as np
 import pytest
+from inside import measuring_product as product
 
 import wavefront as wf
-from wavefront.measuring.weather import product
 
 QUIET = {"progress": False, "workers": 1}
 FAR = wf.Scene([wf.Sphere((0, -50, 0), 1)])  # as good as nothing

@@ -8,11 +8,9 @@ from typing import Any
 import numpy as np
 import pytest
 import scenes
+from inside import BRIGHTEST, NARROW, brightest_emitter, compile_scene
 
 import wavefront as wf
-from wavefront.compile.brightest import brightest_emitter
-from wavefront.features.compiling import compile_scene
-from wavefront.film.aov_names import BRIGHTEST, NARROW
 
 QUIET: dict[str, Any] = {"progress": False, "workers": 1}
 BLACK = wf.Diffuse(0)

@@ -6,9 +6,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 from gltf_builder import Builder
+from inside import f4
 
 import wavefront as wf
-from wavefront.arrays.vec import f4
 
 QUIET = {"progress": False, "workers": 1}
 SUN = np.array([0.5, 0.6, 0.3])

@@ -8,11 +8,10 @@ from typing import Any
 import numpy as np
 import pytest
 import scenes
+from inside import SENSORS, cosine_hemisphere, uniform_sphere
 from significance import Mean, assert_mean
 
 import wavefront as wf
-from wavefront.sampling.warp import cosine_hemisphere, uniform_sphere
-from wavefront.stages.sensors import SENSORS
 
 QUIET: dict[str, Any] = {"progress": False, "workers": 1}
 BLACK = wf.Diffuse(0)

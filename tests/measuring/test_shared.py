@@ -8,11 +8,11 @@ from typing import Any
 import numpy as np
 import pytest
 import scenes
+from inside import MEMBERS, PointTiles, nearby_ranks
 from scipy import stats
 from significance import ALPHA, Mean, assert_mean
 
 import wavefront as wf
-from wavefront.sampling.tiles import MEMBERS, PointTiles, nearby_ranks
 
 QUIET: dict[str, Any] = {"progress": False, "workers": 1}
 POINTS, UP = wf.grid_points((-0.9, -0.95, 0.1), (0, 0, 0.8), (1.8, 0, 0), (8, 8))

@@ -7,14 +7,12 @@ from collections.abc import Callable
 
 import numpy as np
 import pytest
+from inside import absorption, compile_scene, make_accelerator
+from inside import scene as compiling
 from scenes import BLACK, probe
 from significance import assert_mean, assert_same_images, channels, render, repeat
 
 import wavefront as wf
-from wavefront.accel import make_accelerator
-from wavefront.compile import absorption
-from wavefront.compile import scene as compiling
-from wavefront.features.compiling import compile_scene
 
 ALL = ("naive", "direct_simple", "direct_mis", "full")
 MIRRORED = np.diag([-1.0, 1, 1, 1])

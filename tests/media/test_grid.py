@@ -2,17 +2,13 @@
 
 import numpy as np
 import pytest
+from inside import MediumRays, StepNumbers, Voxels, blackbody_colors, bounds_in_cells, survivors
 from scenes import probe
 from scipy import stats
 from scipy.ndimage import map_coordinates
 from significance import ALPHA, assert_mean, assert_same_images, channels, render, repeat
 
 import wavefront as wf
-from wavefront.colors.spectrum import blackbody_colors
-from wavefront.media.base import MediumRays
-from wavefront.media.grid import survivors
-from wavefront.media.voxels import Voxels, bounds_in_cells
-from wavefront.sampling.steps import StepNumbers
 
 BOX = ((-1, -1, -1), (1, 1, 1))
 FAR = wf.Sphere((0, 0, -1e4), 1, material=wf.Diffuse(0.0))

@@ -1,10 +1,7 @@
 """Rays through the cells of grids, against quadrature."""
 
 import numpy as np
-
-from wavefront.media.base import MediumRays
-from wavefront.media.marching import March
-from wavefront.sampling.steps import StepNumbers
+from inside import March, MediumRays, StepNumbers
 
 CELLS = np.array([[5, 2], [4, 3], [3, 7]])  # along x, y and z, of two grids
 VALUES = np.random.default_rng(1).random(5 * 4 * 3 + 2 * 3 * 7).astype(np.float32)

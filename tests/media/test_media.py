@@ -3,13 +3,11 @@
 import numpy as np
 import pytest
 import significance
+from inside import MediumRays, PhaseBsdf, SurfaceInteraction
 from scenes import probe
 from significance import assert_mean, assert_same_images, channels, measure, render, repeat
 
 import wavefront as wf
-from wavefront.arrays.state import SurfaceInteraction
-from wavefront.compile.media import PhaseBsdf
-from wavefront.media.base import MediumRays
 
 ALL = ("naive", "direct_simple", "direct_mis", "full")
 FAR = wf.Sphere((0, 0, -1e4), 1, material=wf.Diffuse(0.0))  # a scene has a shape

@@ -2,9 +2,9 @@
 
 import numpy as np
 import pytest
+from inside import deflected
 
 import wavefront as wf
-from wavefront.media.phase import deflected
 
 PHASES = [
     wf.Isotropic(),

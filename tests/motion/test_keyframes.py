@@ -4,14 +4,24 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from inside import (
+    CUBIC,
+    LINEAR,
+    STEP,
+    Product,
+    Together,
+    Track,
+    Trs,
+    Turn,
+    polar,
+    quaternions_of,
+    rotation_of,
+    slerp,
+)
+from inside import motion_product as product
 from strategies import rotations, seeds
 
 import wavefront as wf
-from wavefront.motion import Product, Together, product
-from wavefront.motion.keyframes import Trs
-from wavefront.motion.quaternions import polar, quaternions_of, rotation_of, slerp
-from wavefront.motion.track import CUBIC, LINEAR, STEP, Track
-from wavefront.motion.turn import Turn
 
 EPS = np.finfo(np.float64).eps
 some = settings(max_examples=settings.default.max_examples // 4)

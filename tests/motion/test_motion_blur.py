@@ -4,16 +4,11 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
+from inside import Shutter, compile_scene, generate, make_accelerator, make_sampler, seen_by
 from scipy import integrate, stats
 from significance import ALPHA, render, smallest_p
 
 import wavefront as wf
-from wavefront.accel import make_accelerator
-from wavefront.features.compiling import compile_scene
-from wavefront.features.view import seen_by
-from wavefront.motion.shutter import Shutter
-from wavefront.sampling.sampler import make_sampler
-from wavefront.stages.generate import generate
 
 OPTIONS = {"ground": False, "lighting": None, "branches": 1, "reuse": False}
 

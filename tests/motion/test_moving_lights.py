@@ -2,12 +2,9 @@
 
 import numpy as np
 import pytest
+from inside import Receiver, Shutter, compile_scene, make_accelerator
 
 import wavefront as wf
-from wavefront.accel import make_accelerator
-from wavefront.features.compiling import compile_scene
-from wavefront.lights import Receiver
-from wavefront.motion.shutter import Shutter
 
 N = 256
 

@@ -6,25 +6,26 @@ import threading
 import numpy as np
 import pytest
 import scenes
-from significance import render
-
-import wavefront as wf
-from wavefront.arrays.vec import f4
-from wavefront.drive import final_checks as outcome
-from wavefront.drive import jobs as scheduler
-from wavefront.drive import session, tracing
-from wavefront.drive.jobs import (
+from inside import (
     MIN_SPP,
     SQUARE,
     CameraJob,
-    Job,
+    Film,
     JobResult,
     Scheduler,
+    f4,
     next_stop,
     passes,
+    session,
     split_jobs,
+    tracing,
 )
-from wavefront.film.film import Film
+from inside import drive_Job as Job
+from inside import final_checks as outcome
+from inside import jobs as scheduler
+from significance import render
+
+import wavefront as wf
 
 
 def lit(size: tuple[int, int] = (24, 16)) -> wf.Scene:

@@ -15,11 +15,11 @@ from typing import Any
 import numpy as np
 import pytest
 import scenes
+from inside import choice
 from scenes import Case
 from significance import ROUNDING, Mean, assert_mean, measure, repeat
 
 import wavefront as wf
-from wavefront.drive import choice
 
 sys.path.insert(0, str(Path(__file__).parents[2] / "benchmarks"))
 from hard_scenes import HARD_SCENES

@@ -4,8 +4,7 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-
-from wavefront.sampling.mis import power_heuristic
+from inside import power_heuristic
 
 densities = st.one_of(
     st.just(0.0),

@@ -5,15 +5,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 import scenes
+from inside import ROULETTE_AFTER, SAMPLERS, Dimension, LightTable, TriangleLights, f4, make_sampler, warp
 from scenes import Case, each
 from significance import ROUNDING, Mean, assert_mean, measure, repeat
 
 import wavefront as wf
-from wavefront.arrays.vec import f4
-from wavefront.compile.scene import ROULETTE_AFTER
-from wavefront.lights import LightTable, TriangleLights
-from wavefront.sampling import warp
-from wavefront.sampling.sampler import SAMPLERS, Dimension, make_sampler
 
 
 def run(case: Case, integrator: str, **options):

@@ -8,21 +8,24 @@ from collections.abc import Callable
 
 import numpy as np
 import pytest
+from inside import (
+    FEW,
+    LEAST_VARIANCE,
+    MAX_DISTANCE,
+    SMALL,
+    BlackLights,
+    BruteForceTriangles,
+    CompiledScene,
+    PatchedEnvironment,
+    SkyPatches,
+    compile_scene,
+    luminance,
+    make_accelerator,
+)
 from scenes import ALBEDO, BLACK, HERE, SAMPLING_LIGHTS, box, floor, polygon_irradiance, probe
 from significance import Mean, assert_mean, channels, measure, render
 
 import wavefront as wf
-from wavefront.accel import make_accelerator
-from wavefront.accel.brute_force import BruteForceTriangles
-from wavefront.accel.numpy_accel import SMALL
-from wavefront.arrays.vec import luminance
-from wavefront.compile.scale import MAX_DISTANCE
-from wavefront.compile.scene import CompiledScene
-from wavefront.features.black_lights import BlackLights
-from wavefront.features.compiling import compile_scene
-from wavefront.lights import PatchedEnvironment, SkyPatches
-from wavefront.lights.image import LEAST_VARIANCE
-from wavefront.lights.triangle import FEW
 
 f4 = np.float32
 CENTER = np.array((0.9, 0.4, 0.3))  # of what is in a closed box, where no ray gets

@@ -6,9 +6,9 @@ from typing import Any
 
 import numpy as np
 import pytest
+from inside import MAX_RADIUS, MIN_RADIUS, length_factor, scaled_shapes
 
 import wavefront as wf
-from wavefront.compile.scale import MAX_RADIUS, MIN_RADIUS, length_factor, scaled_shapes
 
 SIDE = 12
 BUMPS = np.random.default_rng(1).random((8, 8))

@@ -21,14 +21,10 @@ from typing import Any
 import numpy as np
 import pytest
 import scenes
+from inside import HEADER, IndependentSampler, Sensors, checkpoint, npz_chunks, read_header
 
 import wavefront as wf
 from wavefront import cli
-from wavefront.camera import Sensors
-from wavefront.core.npz import npz_chunks
-from wavefront.film import checkpoint
-from wavefront.film.checkpoint import HEADER, read_header
-from wavefront.sampling.sampler import IndependentSampler
 
 SIZE = (24, 18)
 BLOBS = [(-1.2, 0.3, 0), (1.1, -0.2, 0.4), (0, 0.9, -0.5)]

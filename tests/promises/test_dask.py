@@ -11,11 +11,10 @@ from typing import Any
 
 import pytest
 import scenes
+from inside import STOP, SharedInt, Stopped, WorkerPool
+from inside import remote as payloads
 
 import wavefront as wf
-from wavefront.core.shared import STOP, SharedInt, Stopped
-from wavefront.workers import remote as payloads
-from wavefront.workers.pool import WorkerPool
 
 distributed = pytest.importorskip("distributed")
 QUIET = {"progress": False, "wave_size": 500}

@@ -21,13 +21,9 @@ from typing import Any
 import numpy as np
 import pytest
 import scenes
+from inside import Payload, WorkerPool, executors, jobs, machine, remote, worker_count
 
 import wavefront as wf
-from wavefront.drive import jobs
-from wavefront.workers import executors, machine, remote
-from wavefront.workers.executors import worker_count
-from wavefront.workers.pool import WorkerPool
-from wavefront.workers.remote import Payload
 
 needs_fork = pytest.mark.skipif(not sys.platform.startswith("linux"), reason="needs fork")
 QUIET = {"progress": False, "wave_size": 500}

@@ -9,12 +9,10 @@ from typing import Any
 import numpy as np
 import pytest
 import scenes
+from inside import BsdfSample, column, f4, li_full
 from significance import render
 
 import wavefront as wf
-from wavefront.arrays.vec import column, f4
-from wavefront.bsdfs import BsdfSample
-from wavefront.integrators import li_full
 
 
 class Spoiled(wf.Diffuse):

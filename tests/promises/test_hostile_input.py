@@ -45,10 +45,10 @@ from typing import Any
 import numpy as np
 import pytest
 from gltf_builder import Builder
+from inside import ACCELERATORS
 from significance import render
 
 import wavefront as wf
-from wavefront.accel.registry import ACCELERATORS
 
 MEMORY, SECONDS = 3 << 30, 25
 POINTS = "v 0 0 0\nv 1 0 0\nv 0 1 0\n"

@@ -11,11 +11,10 @@ from pathlib import Path
 
 import pytest
 import scenes
+from inside import AT_ONCE, STOP, InterruptHandler, SharedInt
 from scripts import ENDLESS, children, end_of, runs, script, wait_for
 
 import wavefront as wf
-from wavefront.core.interrupt import InterruptHandler
-from wavefront.core.shared import AT_ONCE, STOP, SharedInt
 
 pytestmark = pytest.mark.skipif(not sys.platform.startswith("linux"), reason="signals and processes of Linux")
 

@@ -9,11 +9,8 @@ import sys
 import threading
 
 import pytest
+from inside import STOP, InterruptHandler, ProcessPool, SharedInt, deferred_signals
 from scripts import start_python
-
-from wavefront.core.interrupt import InterruptHandler, deferred_signals
-from wavefront.core.shared import STOP, SharedInt
-from wavefront.workers.processes import ProcessPool
 
 pytestmark = pytest.mark.skipif(not sys.platform.startswith("linux"), reason="signals and processes of Linux")
 SOON = 2.0  # seconds to the prompt

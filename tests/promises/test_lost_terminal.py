@@ -17,13 +17,10 @@ from typing import Any
 
 import pytest
 import scenes
+from inside import Bar, notebook, phase, progress, warn_caller
 
 import wavefront as wf
 from wavefront import cli
-from wavefront.core import progress
-from wavefront.core.errors import warn_caller
-from wavefront.core.progress import Bar, phase
-from wavefront.drive import notebook
 
 LINUX = sys.platform.startswith("linux")
 TRIANGLE = "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n"

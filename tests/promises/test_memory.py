@@ -9,9 +9,9 @@ from typing import Any
 
 import pytest
 import scenes
+from inside import available_memory, check_memory
 
 import wavefront as wf
-from wavefront.core.memory import available_memory, check_memory
 
 linux = pytest.mark.skipif(not sys.platform.startswith("linux"), reason="limits of Linux")
 

@@ -12,22 +12,24 @@ from typing import Any
 import numpy as np
 import pytest
 import scenes
-
-import wavefront as wf
-from wavefront.core.memory import memory_size, resident_memory
-from wavefront.drive import plan
-from wavefront.drive.jobs import LARGE_WAVE, SMALL_WAVE
-from wavefront.drive.plan import (
+from inside import (
     LANE_BYTES,
+    LARGE_WAVE,
     LEAST_WAVE,
     PROCESS_BYTES,
+    SMALL_WAVE,
     THREAD_BYTES,
-    Budget,
+    Settings,
+    li_full,
     make_budget,
+    memory_size,
     picture_memory,
+    plan,
+    resident_memory,
 )
-from wavefront.integrators import li_full
-from wavefront.settings import Settings
+from inside import drive_Budget as Budget
+
+import wavefront as wf
 
 MEGABYTE = 10**6
 PEAKS = Path(__file__).parents[2] / "benchmarks" / "memory.py"

@@ -11,12 +11,9 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from inside import Film, Sensors, f4, main
 
 import wavefront as wf
-from wavefront.arrays.vec import f4
-from wavefront.camera import Sensors
-from wavefront.cli import main
-from wavefront.film.film import Film
 
 
 def film_of(samples: np.ndarray) -> Film:

@@ -19,9 +19,9 @@ from typing import Any
 
 import numpy as np
 import pytest
+from inside import write_image
 
 import wavefront as wf
-from wavefront.codecs.images import write_image
 
 SUFFIXES = [
     "mtl",

@@ -7,10 +7,10 @@ import signal
 import sys
 
 import pytest
+from inside import interrupt
 from scripts import CLOSED, SOON, eventually, runs, start_python
 
 import wavefront as wf
-from wavefront.core import interrupt
 
 POOL = """
 import os

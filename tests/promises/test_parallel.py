@@ -18,16 +18,23 @@ from typing import Any
 import numpy as np
 import pytest
 import scenes
+from inside import (
+    MIN_PATHS,
+    MIN_PATHS_TO_SPAWN,
+    STOP,
+    ProcessPool,
+    Sensors,
+    SharedInt,
+    Stopped,
+    WorkerPool,
+    choose_executor,
+    executors,
+    worker_count,
+)
 from scripts import eventually, runs
 from threadpoolctl import threadpool_limits
 
 import wavefront as wf
-from wavefront.camera import Sensors
-from wavefront.core.shared import STOP, SharedInt, Stopped
-from wavefront.workers import executors
-from wavefront.workers.executors import MIN_PATHS, MIN_PATHS_TO_SPAWN, choose_executor, worker_count
-from wavefront.workers.pool import WorkerPool
-from wavefront.workers.processes import ProcessPool
 
 LINUX = sys.platform.startswith("linux")
 EXECUTORS = ["threads", pytest.param("processes", marks=pytest.mark.skipif(not LINUX, reason="needs fork"))]

@@ -8,9 +8,9 @@ from typing import Any
 import numpy as np
 import pytest
 import scenes
+from inside import command_line
 
 import wavefront as wf
-from wavefront.cli import command_line
 
 VERTICES = np.array([[0.0, 0, 0], [1, 0, 0], [0, 1, 0]])
 FACES = np.array([[0, 1, 2]])

@@ -17,11 +17,10 @@ from typing import Any
 import numpy as np
 import pytest
 import scenes
+from inside import executors, single_threaded_blas
 from threadpoolctl import threadpool_info, threadpool_limits
 
 import wavefront as wf
-from wavefront.workers import executors
-from wavefront.workers.machine import single_threaded_blas
 
 QUIET = {"progress": False, "wave_size": 500}
 LINUX = sys.platform.startswith("linux")

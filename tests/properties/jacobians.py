@@ -14,11 +14,9 @@ from contextlib import contextmanager
 import numpy as np
 from hypothesis import assume, settings
 from hypothesis import strategies as st
-
-from wavefront.bsdfs.albedo import _dielectric_tables as dielectric_tables
-from wavefront.bsdfs.albedo import gloss_tables
-from wavefront.bsdfs.sheen import _albedo_table as sheen_table
-from wavefront.lights import Receiver
+from inside import Receiver, gloss_tables
+from inside import _albedo_table as sheen_table
+from inside import _dielectric_tables as dielectric_tables
 
 Doubles = np.ndarray
 ROOMS = (

@@ -9,20 +9,19 @@ import numpy as np
 import pytest
 from hypothesis import assume, given
 from hypothesis import strategies as st
-from jacobians import columns, doubles, fewest, inner, jacobian, some
-from measurements import measured
-
-from wavefront import bsdfs
-from wavefront.arrays.state import SurfaceInteraction
-from wavefront.arrays.vec import INV_PI, normalize
-from wavefront.bsdfs import (
+from inside import (
+    INV_PI,
+    UP,
     Bsdf,
     Conductor,
     Dielectric,
     Diffuse,
     DiffuseTransmission,
     Disney,
+    Facets,
+    LayeredBsdf,
     Measured,
+    Microfacets,
     Mirror,
     Mix,
     OpenPBRBsdf,
@@ -31,16 +30,22 @@ from wavefront.bsdfs import (
     Principled,
     ShadowCatcher,
     Sides,
+    SurfaceInteraction,
     ThinDielectric,
     ThinDisney,
+    Varnish,
+    _coordinates,
+    _elevation,
+    _transformation,
+    _turned,
+    alpha_of,
+    cosine_hemisphere_inverse,
+    normalize,
 )
-from wavefront.bsdfs.fuzz import _transformation
-from wavefront.bsdfs.layers.coat import Varnish
-from wavefront.bsdfs.layers.layers import LayeredBsdf
-from wavefront.bsdfs.measured import UP, _coordinates, _elevation, _turned
-from wavefront.bsdfs.microfacet import Facets, alpha_of
-from wavefront.bsdfs.rough import Microfacets
-from wavefront.sampling.warp import cosine_hemisphere_inverse
+from jacobians import columns, doubles, fewest, inner, jacobian, some
+from measurements import measured
+
+from wavefront import bsdfs
 
 f4 = np.float32
 CHOICES = 1024  # numbers u[2] that are tried: the part of a lobe is known to 2/CHOICES

@@ -6,6 +6,22 @@ import pytest
 from hypothesis import assume, given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
+from inside import (
+    ConstantEnvironment,
+    EnvironmentSum,
+    LightRecord,
+    LightTable,
+    PointLightRecord,
+    Receiver,
+    RectangleLights,
+    SphereLights,
+    TexturedSphereLights,
+    TexturedTriangleLights,
+    TriangleLights,
+    TwoSidedRectangleLights,
+    TwoSidedTexturedTriangleLights,
+    TwoSidedTriangleLights,
+)
 from jacobians import (
     assert_density,
     columns,
@@ -18,20 +34,6 @@ from jacobians import (
 )
 
 import wavefront as wf
-from wavefront.lights import (
-    ConstantEnvironment,
-    EnvironmentSum,
-    LightRecord,
-    LightTable,
-    PointLightRecord,
-    Receiver,
-    SphereLights,
-    TriangleLights,
-)
-from wavefront.lights.rectangle import RectangleLights, TwoSidedRectangleLights
-from wavefront.lights.textured_emission import TexturedTriangleLights, TwoSidedTexturedTriangleLights
-from wavefront.lights.textured_sphere import TexturedSphereLights
-from wavefront.lights.triangle import TwoSidedTriangleLights
 
 f4 = np.float32
 sizes = st.floats(0.125, 2, width=32)

@@ -4,9 +4,8 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from inside import SAMPLERS, _mix_longs, _stream, make_sampler
 from jacobians import some
-
-from wavefront.sampling.sampler import SAMPLERS, _mix_longs, _stream, make_sampler
 
 words = st.integers(0, 2**32 - 1)
 addresses = {

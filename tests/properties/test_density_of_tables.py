@@ -7,6 +7,26 @@ import pytest
 from hypothesis import assume, given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
+from inside import (
+    LIGHT_SAMPLERS,
+    Discrete,
+    Distribution2D,
+    Emitters,
+    Guidance,
+    GuideCells,
+    GuideTable,
+    HalvedLightSampler,
+    IrradianceOf,
+    LightSampler,
+    LightTreeSampler,
+    PointLightRecord,
+    Receiver,
+    SubsetLightSampler,
+    TriangleLights,
+    WeightedLightSampler,
+    grid,
+    samplers,
+)
 from jacobians import (
     assert_density,
     columns,
@@ -19,22 +39,6 @@ from jacobians import (
     surfaces,
     width_of_choice,
 )
-
-from wavefront.guiding.cells import GuideCells
-from wavefront.guiding.guide_table import GuideTable
-from wavefront.lights import PointLightRecord, TriangleLights, grid, samplers
-from wavefront.lights.base import Emitters, Receiver
-from wavefront.lights.choice import LightSampler
-from wavefront.lights.samplers import (
-    LIGHT_SAMPLERS,
-    HalvedLightSampler,
-    SubsetLightSampler,
-    WeightedLightSampler,
-)
-from wavefront.lights.table import IrradianceOf
-from wavefront.lights.tree import LightTreeSampler
-from wavefront.sampling.discrete import Discrete, Distribution2D
-from wavefront.stages.shade import Guidance
 
 f4 = np.float32
 some_weights = st.floats(0, 1).map(lambda x: 0.0 if x < 0.1 else x)  # some are 0

@@ -4,10 +4,8 @@ import numpy as np
 import pytest
 from hypothesis import assume, given
 from hypothesis import strategies as st
+from inside import SphericalRectangle, filters, warp
 from jacobians import assert_density, columns, doubles, inner, points_of_the_square, some
-
-from wavefront.sampling import filters, warp
-from wavefront.sampling.spherical import SphericalRectangle
 
 EMPTY = st.just(())
 # name: further arguments

@@ -10,9 +10,9 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from inside import ORDER
 
 import wavefront as wf
-from wavefront.integrators.stage_list import ORDER
 
 ROOT = Path(__file__).parents[2]
 PAGES = sorted(

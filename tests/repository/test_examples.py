@@ -9,10 +9,10 @@ from pathlib import Path
 import imageio.v3 as iio
 import numpy as np
 import pytest
+from inside import BSDFS_ALL as ALL
+from inside import OpenPBRBsdf, as_material
 
 import wavefront as wf
-from wavefront.bsdfs import ALL, OpenPBRBsdf
-from wavefront.materials import as_material
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
 SHAPES = {  # the picture of --size 24, (height, width)

@@ -10,9 +10,9 @@ from importlib.resources import files
 from pathlib import Path
 
 import pytest
+from inside import VERSION
 
 import wavefront as wf
-from wavefront.version import VERSION
 
 ROOT = Path(__file__).parents[2]
 PUBLIC = {name: getattr(wf, name) for name in wf.__all__}

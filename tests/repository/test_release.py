@@ -7,8 +7,7 @@ from importlib.util import module_from_spec, spec_from_loader
 from pathlib import Path
 
 import pytest
-
-from wavefront.version import VERSION
+from inside import VERSION
 
 ROOT = Path(__file__).parents[2]
 FILES = ("wavefront/version.py", "CHANGELOG.md", "CITATION.cff")

@@ -5,10 +5,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
+from inside import Discrete, Distribution2D, SceneError
 from scipy import stats
-
-from wavefront.core.errors import SceneError
-from wavefront.sampling.discrete import Discrete, Distribution2D
 
 BELOW_ONE = np.float32(1 - 2.0**-24)
 

@@ -6,11 +6,10 @@ from typing import Any
 
 import numpy as np
 import pytest
+from inside import FILTERS, f4
 from significance import render
 
 import wavefront as wf
-from wavefront.arrays.vec import f4
-from wavefront.sampling.filters import FILTERS
 
 OWN: dict[str, Any] = {  # those of Mitsuba and pbrt among them
     "box": wf.BoxFilter(),

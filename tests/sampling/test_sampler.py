@@ -6,11 +6,7 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from scipy import stats
-
-import wavefront.sampling.sampler as module
-from wavefront.core.errors import SceneError
-from wavefront.sampling.sampler import (
+from inside import (
     BLOCK,
     SAMPLERS,
     VARIANTS,
@@ -18,10 +14,14 @@ from wavefront.sampling.sampler import (
     Dimension,
     IndependentSampler,
     Sampler,
+    SceneError,
     SobolSampler,
     make_sampler,
     numbers_of,
 )
+from scipy import stats
+
+import wavefront.sampling.sampler as module
 
 KINDS = {"independent": IndependentSampler, "sobol": SobolSampler, "bluenoise": BlueNoiseSampler}
 names = pytest.mark.parametrize("name", sorted(SAMPLERS))

@@ -1,10 +1,8 @@
 """Numbers for steps without end."""
 
 import numpy as np
+from inside import Dimension, StepNumbers
 from scipy import stats
-
-from wavefront.sampling.sampler import Dimension
-from wavefront.sampling.steps import StepNumbers
 
 N = 1 << 14
 

@@ -7,10 +7,8 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from inside import SphericalRectangle, warp
 from scipy import stats
-
-from wavefront.sampling import warp
-from wavefront.sampling.spherical import SphericalRectangle
 
 BELOW_ONE = float(np.float32(1 - 2.0**-24))
 TURN = 2 * np.pi

@@ -2,9 +2,9 @@
 
 import numpy as np
 import pytest
+from inside import li_full
 
 import wavefront as wf
-from wavefront.integrators import li_full
 
 CAMERA = wf.Camera.look_at((0, 0.5, 4), (0, 0, 0), fov=40, size=(32, 24))
 VEIL = wf.Material(wf.Diffuse((0.2, 0.7, 0.3)), alpha=0.4)

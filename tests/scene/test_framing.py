@@ -9,10 +9,9 @@ import pytest
 import trimesh
 from hypothesis import given
 from hypothesis import strategies as st
+from inside import VIEWS, main
 
 import wavefront as wf
-from wavefront.cli import main
-from wavefront.scene.scene import VIEWS
 
 CAMERA = wf.Camera.look_at((0, 0, 9), (0, 0, 0))
 SIZES = [(64, 64), (40, 96), (160, 16)]

@@ -6,10 +6,9 @@ from typing import Any
 
 import numpy as np
 import pytest
+from inside import LIGHTINGS, PRESETS, lighted, lighting
 
 import wavefront as wf
-from wavefront.scene import lighting
-from wavefront.scene.lighting import LIGHTINGS, PRESETS, lighted
 
 CUBE = np.array([[x, y, z] for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)], float)
 SIDES = [[0, 1, 3, 2], [4, 6, 7, 5], [0, 4, 5, 1], [2, 3, 7, 6], [0, 2, 6, 4], [1, 5, 7, 3]]

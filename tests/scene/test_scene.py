@@ -5,13 +5,10 @@ from typing import Any, Self
 import numpy as np
 import pytest
 import scenes
+from inside import compile_scene, f4, group_materials, make_accelerator
 from significance import render
 
 import wavefront as wf
-from wavefront.accel import make_accelerator
-from wavefront.arrays.vec import f4
-from wavefront.compile.materials import group_materials
-from wavefront.features.compiling import compile_scene
 
 NAN, INF = np.nan, np.inf
 TRIANGLE = {"vertices": [[0, 0, 0], [1, 0, 0], [0, 1, 0]], "faces": [[0, 1, 2]]}

@@ -2,11 +2,9 @@
 
 import numpy as np
 import pytest
+from inside import DEFAULT_SPP, LITTLE_NOISE, QUICK_SPP, main, passes_until_clean
 
 import wavefront as wf
-from wavefront.cli import main
-from wavefront.drive.jobs import QUICK_SPP, passes_until_clean
-from wavefront.settings.settings import DEFAULT_SPP, LITTLE_NOISE
 
 BALL = wf.Sphere((0, 0, 0), 1)
 LIT = [BALL, wf.PointLight((2, 3, 4), 50), wf.Environment(0.2)]

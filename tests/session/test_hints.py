@@ -6,10 +6,9 @@ from typing import Any
 import numpy as np
 import pytest
 import trimesh
+from inside import hints, installed
 
 import wavefront as wf
-from wavefront.accel.embree import installed
-from wavefront.drive import hints
 
 FLOOR = wf.Rectangle((-3, 0, 3), (6, 0, 0), (0, 0, -6))
 GLASS = wf.Sphere((0, 0.7, 0), 0.6, material=wf.Dielectric(1.5))

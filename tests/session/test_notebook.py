@@ -13,11 +13,10 @@ from typing import Any
 import imageio.v3 as iio
 import numpy as np
 import pytest
+from inside import ball_png, in_kernel, run_shown, shows_pictures
+from inside import notebook as module
 
 import wavefront as wf
-from wavefront.drive import notebook as module
-from wavefront.drive.notebook import in_kernel, run_shown, shows_pictures
-from wavefront.material_ball import ball_png
 
 BALL = [wf.Sphere((0, 0, 0), 1), wf.Environment(1)]
 

@@ -7,10 +7,10 @@ import numpy as np
 import pytest
 import scenes
 import trimesh
+from inside import SAMPLERS
 from significance import render
 
 import wavefront as wf
-from wavefront.sampling.sampler import SAMPLERS
 
 BALL = wf.Sphere((0, 0, 0), 1)
 SPP = 5

@@ -13,14 +13,11 @@ from typing import Any
 import numpy as np
 import pytest
 import scenes
+from inside import SharedInt, inline, plan, pool, warn_caller
+from inside import session as module
 from scripts import children, end_of, eventually, runs, script, wait_for
 
 import wavefront as wf
-from wavefront.core.errors import warn_caller
-from wavefront.core.shared import SharedInt
-from wavefront.drive import inline, plan
-from wavefront.drive import session as module
-from wavefront.workers import pool
 
 LINUX = sys.platform.startswith("linux")
 needs_fork = pytest.mark.skipif(not LINUX, reason="needs fork")

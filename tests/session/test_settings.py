@@ -9,11 +9,10 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from inside import AOVS, SETTINGS, Settings
 
 import wavefront as wf
 from wavefront import cli
-from wavefront.film.aov_names import AOVS
-from wavefront.settings import SETTINGS, Settings
 
 
 def described(docstring: str) -> dict[str, str]:

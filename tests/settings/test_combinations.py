@@ -9,13 +9,10 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from inside import EXCLUSIONS, MEDIA, MOVING, ROLLING, SETTING_OF, SETTINGS, Exclusion, choice, table, tiles
 from scenes import cornell_box
 
 import wavefront as wf
-from wavefront.drive import choice
-from wavefront.sampling import tiles
-from wavefront.settings import SETTINGS
-from wavefront.settings.checks import EXCLUSIONS, MEDIA, MOVING, ROLLING, SETTING_OF, Exclusion, table
 
 CAMERA = wf.Camera.look_at((3, 2, 4), (0, 0, 0), fov=45, size=(8, 8))
 ANOTHER = "another integrator"

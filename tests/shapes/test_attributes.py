@@ -2,12 +2,10 @@
 
 import numpy as np
 import pytest
+from inside import BaseTexture, compile_scene, make_accelerator
 from significance import render
 
 import wavefront as wf
-from wavefront.accel import make_accelerator
-from wavefront.features.compiling import compile_scene
-from wavefront.textures.base import BaseTexture
 
 SQUARE = {"vertices": [[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]], "faces": [[0, 1, 2], [0, 2, 3]]}
 CORNERS = np.array([[0, 0], [1, 0], [1, 1], [0, 1]])

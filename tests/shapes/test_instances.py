@@ -8,26 +8,32 @@ import numpy as np
 import pytest
 import trimesh
 from counting import calls
+from inside import (
+    FACES,
+    CompiledScene,
+    InstanceAccelerator,
+    Intersections,
+    PlateAccelerator,
+    Rays,
+    can_place,
+    compile_scene,
+    dot,
+    installed,
+    instance_bounds,
+    interaction,
+    intersect,
+    lighted,
+    make_accelerator,
+    perturb_normals,
+    surely_occluded,
+)
+from inside import instances as queries
+from inside import scene as scene_module
 from rays import nothing, same_bits
 from significance import render
 from trimesh.transformations import euler_matrix, translation_matrix
 
 import wavefront as wf
-from wavefront.accel import InstanceAccelerator, Intersections, make_accelerator
-from wavefront.accel import instances as queries
-from wavefront.accel.embree import installed
-from wavefront.accel.plate import PlateAccelerator, surely_occluded
-from wavefront.arrays.state import Rays
-from wavefront.arrays.vec import dot
-from wavefront.compile import scene as scene_module
-from wavefront.compile.scene import CompiledScene
-from wavefront.features.compiling import compile_scene
-from wavefront.scene.lighting import lighted
-from wavefront.shapes.instance import can_place, instance_bounds
-from wavefront.shapes.plate import FACES
-from wavefront.stages.interaction import interaction
-from wavefront.stages.intersect import intersect
-from wavefront.stages.normal_mapping import perturb_normals
 
 f4 = np.float32
 NAMES = ["numpy", pytest.param("embree", marks=pytest.mark.skipif(not installed(), reason="no embreex"))]

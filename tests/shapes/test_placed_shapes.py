@@ -6,9 +6,9 @@ from typing import Any
 
 import numpy as np
 import pytest
+from inside import SpherePrimitives
 
 import wavefront as wf
-from wavefront.accel.sphere import SpherePrimitives
 
 TURN = np.array([[0.36, 0.48, -0.8], [-0.8, 0.6, 0.0], [0.48, 0.64, 0.6]])  # a rotation
 

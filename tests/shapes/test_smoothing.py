@@ -8,11 +8,10 @@ from typing import Any
 import numpy as np
 import pytest
 import trimesh
+from inside import crease_normals, main
 from numpy.typing import NDArray
 
 import wavefront as wf
-from wavefront.cli import main
-from wavefront.shapes.smoothing import crease_normals
 
 FAST: dict[str, Any] = {"spp": 2, "size": (12, 12), "progress": False}
 BALL = trimesh.creation.icosphere(3)

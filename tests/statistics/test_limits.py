@@ -2,10 +2,8 @@
 
 import numpy as np
 import pytest
+from inside import EVENTS, UNSEEN, event_of, light_limits, moderated_variance, rule_of_three
 from scipy import stats
-
-from wavefront.statistics import event_of, light_limits, moderated_variance, rule_of_three
-from wavefront.statistics.limits import EVENTS, UNSEEN
 
 
 def array(*values):

@@ -7,10 +7,9 @@ from typing import Any
 import numpy as np
 import pytest
 import scenes
+from inside import Film, _steps_of_gain, batch_size
 
 import wavefront as wf
-from wavefront.film.film import Film, batch_size
-from wavefront.statistics.region import _steps_of_gain
 
 QUIET: dict[str, Any] = {"progress": False, "workers": 1, "branches": 1}
 

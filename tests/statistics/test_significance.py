@@ -2,17 +2,22 @@
 
 import numpy as np
 import pytest
+from inside import (
+    Film,
+    PictureSums,
+    _around,
+    _estimate,
+    _p_of_mean,
+    film_image,
+    log_gamma,
+    shared_samples,
+    sidak,
+    t_tail,
+)
 from scipy import special, stats
 from significance import render
 
 import wavefront as wf
-from wavefront.film.film import Film
-from wavefront.film.picture_sums import PictureSums
-from wavefront.film.samples import shared_samples
-from wavefront.image.comparison import _estimate
-from wavefront.image.image import film_image
-from wavefront.statistics.significance import _around, _p_of_mean, sidak
-from wavefront.statistics.student_t import log_gamma, t_tail
 
 SIZE = 16
 

@@ -5,16 +5,20 @@ from dataclasses import replace
 import numpy as np
 import pytest
 import scenes
+from inside import (
+    BsdfSample,
+    ConstantEnvironment,
+    Dielectric,
+    Diffuse,
+    PointLight,
+    SphereLights,
+    TriangleLights,
+    warp,
+    weigh,
+)
 from scipy import special, stats
 
 from wavefront import testing
-from wavefront.bsdfs import BsdfSample, Dielectric, Diffuse
-from wavefront.bsdfs.base import weigh
-from wavefront.lights import PointLight
-from wavefront.lights.environment import ConstantEnvironment
-from wavefront.lights.sphere import SphereLights
-from wavefront.lights.triangle import TriangleLights
-from wavefront.sampling import warp
 from wavefront.testing import chi2
 
 F4 = np.float32

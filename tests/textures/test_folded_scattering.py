@@ -4,19 +4,22 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from inside import (
+    BsdfSample,
+    Frame,
+    MappedShading,
+    _folded,
+    _sample,
+    _surface,
+    broadcast,
+    ensure_valid_reflection,
+    group_materials,
+    origin_above,
+    weigh,
+)
 from significance import assert_same_images, repeat
 
 import wavefront as wf
-from wavefront.arrays.frame import Frame
-from wavefront.arrays.vec import broadcast
-from wavefront.bsdfs import BsdfSample
-from wavefront.bsdfs.base import weigh
-from wavefront.compile.materials import group_materials
-from wavefront.features.normal_maps import MappedShading, _folded
-from wavefront.stages.bounce import _sample
-from wavefront.stages.interaction import origin_above
-from wavefront.stages.normal_mapping import ensure_valid_reflection
-from wavefront.testing.bsdf import _surface
 
 F4 = np.float32
 WHITE = wf.Principled(1.0, metallic=1, roughness=0.3)

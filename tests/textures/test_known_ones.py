@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from inside import plate
 
 import wavefront as wf
-from wavefront.shapes.plate import plate
 
 HOLE = np.ones((8, 16))
 HOLE[2, 5] = 0.999  # from u = 5/16 to 6/16, from v = 5/8 to 6/8

@@ -6,15 +6,20 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from inside import (
+    Hits,
+    Rays,
+    compile_scene,
+    ensure_valid_reflection,
+    interaction,
+    intersect,
+    make_accelerator,
+    mirror_hidden,
+    perturb_normals,
+)
 from significance import Mean, assert_same_images, render, repeat
 
 import wavefront as wf
-from wavefront.accel import make_accelerator
-from wavefront.arrays.state import Hits, Rays
-from wavefront.features.compiling import compile_scene
-from wavefront.stages.interaction import interaction
-from wavefront.stages.intersect import intersect
-from wavefront.stages.normal_mapping import ensure_valid_reflection, mirror_hidden, perturb_normals
 
 F4 = np.float32
 CORNERS = np.array([[0, 0], [1, 0], [1, 1], [0, 1]], float)

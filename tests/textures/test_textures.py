@@ -5,10 +5,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-
-from wavefront.codecs.encoding import srgb_to_linear
-from wavefront.core.errors import SceneError
-from wavefront.textures.image import Texture
+from inside import SceneError, Texture, srgb_to_linear
 
 WRAPS = ("repeat", "mirror", "clamp")
 

@@ -4,10 +4,9 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from inside import COLORS, LIGHT, PATH, is_message, segments_of
 
 import wavefront as wf
-from wavefront.viewer.clicked_path import COLORS, LIGHT, PATH, segments_of
-from wavefront.viewer.guard import is_message
 
 viser = pytest.importorskip("viser")
 msgspec = pytest.importorskip("msgspec")

@@ -27,19 +27,28 @@ from urllib.parse import urlsplit
 import imageio.v3 as iio
 import numpy as np
 import pytest
+from inside import (
+    CHOICES,
+    VIEWER_AOVS,
+    FirstPaint,
+    Guard,
+    Page,
+    Refiner,
+    ViewerFrame,
+    Viewpoint,
+    asked_first,
+    is_message,
+    is_own_address,
+    main,
+    shown_codes,
+    token_of,
+)
+from inside import background_denoiser as denoiser_module
+from inside import page as page_module
+from inside import refiner as module
 from scripts import SOON, eventually
 
 import wavefront as wf
-from wavefront.cli import main
-from wavefront.viewer import background_denoiser as denoiser_module
-from wavefront.viewer import page as page_module
-from wavefront.viewer import refiner as module
-from wavefront.viewer.first_paint import FirstPaint, asked_first
-from wavefront.viewer.guard import Guard, is_message, is_own_address, token_of
-from wavefront.viewer.page import Page
-from wavefront.viewer.refiner import Refiner, ViewerFrame
-from wavefront.viewer.shown import CHOICES, VIEWER_AOVS, shown_codes
-from wavefront.viewer.viewpoint import Viewpoint
 
 viser = pytest.importorskip("viser")
 msgspec = pytest.importorskip("msgspec")  # comes with viser, as the next ones

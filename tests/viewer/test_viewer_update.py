@@ -4,10 +4,10 @@ import time
 
 import numpy as np
 import pytest
+from inside import scene_state
+from inside import viewer as module
 
 import wavefront as wf
-from wavefront.scene.state import scene_state
-from wavefront.viewer import viewer as module
 
 pytest.importorskip("viser")
 SETTINGS = {

@@ -17,9 +17,9 @@ import imageio.v3 as iio
 import numpy as np
 import pytest
 from gltf_builder import Builder
+from inside import main
 
 import wavefront as wf
-from wavefront.cli import main
 
 QUIET: Any = {"progress": False, "workers": 1}
 SMALL: Any = {"size": (20, 16), "seed": 3, **QUIET}

@@ -8,10 +8,9 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from inside import Image, main
 
 import wavefront as wf
-from wavefront.cli import main
-from wavefront.image import Image
 
 SCENE = [wf.Sphere((0, 0, 0), 1, material=wf.Diffuse((0.8, 0.3, 0.2))), wf.Environment(1)]
 
