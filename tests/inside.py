@@ -252,6 +252,7 @@ from wavefront.lights.grid import BY_POWER, SpatialLightSampler
 from wavefront.lights.ies import IESLight, IESLights, Web
 from wavefront.lights.image import LEAST_VARIANCE, ImageEnvironment
 from wavefront.lights.infinite import EnvironmentSum
+from wavefront.lights.moving import DeformingLights, MovingLights
 from wavefront.lights.octahedral import SHARP, OctahedralEnvironment, _directions, _texels
 from wavefront.lights.octahedral import SIDE as LIGHTS_SIDE
 from wavefront.lights.patches import PatchedEnvironment, SkyPatches

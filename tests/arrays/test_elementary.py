@@ -22,12 +22,13 @@ TESTS = Path(__file__).parents[1]
 PACKAGE = Path(wavefront.__file__).parent
 FUNCTIONS = r"np\.(exp2?|expm1|log2?|log1p|log10|sin|cos|tan|arc\w+|sinh|cosh|tanh|power|cbrt|hypot)\("
 # What reaches no picture: projection of points, a tone curve (its codes are rounded), advice, errors of
-# differences, metrics, inverses of warps, a self-test, an example,
+# differences, metrics, inverses of warps, a self-test, examples,
 # curves of a plot.
 ALLOWED = {
     "bsdfs/measured.py": 1,
     "bsdfs/plot.py": 2,
     "camera/distortion.py": 3,
+    "camera/projection.py": 4,
     "cli/doctor_command.py": 5,
     "codecs/tone.py": 1,
     "colors/maps.py": 2,  # which entry of a table of 256 colors a number of data gets
@@ -36,6 +37,7 @@ ALLOWED = {
     "image/image.py": 1,
     "sampling/warp.py": 4,
     "drive/diagnosis.py": 4,
+    "motion/motion.py": 3,
     "shapes/height_field.py": 1,
     "statistics/limits.py": 1,
     "statistics/significance.py": 3,

@@ -150,7 +150,7 @@ def test_no_number_is_used_twice(integrator, options, short_training):
     left_out = {"naive": {Dimension.LIGHT, Dimension.LIGHT_POINT}, "full": set()}
     decisions = {*Dimension, Dimension.OPACITY + 1, Dimension.OPACITY + 2}  # three veils
     decisions -= {Dimension.MEDIUM, Dimension.TRANSMITTANCE}  # no medium scatters
-    decisions -= {Dimension.FEATURE}  # no feature of a user draws
+    decisions -= {Dimension.FEATURE, Dimension.TIME}  # no feature of a user draws, and nothing moves
     assert {dimension for _, dimension in given[-1].given} == decisions - left_out.get(
         integrator, {Dimension.ROULETTE}
     ) - (set() if "guide" in options else {Dimension.GUIDE, Dimension.GUIDE_DIRECTION}) - (

@@ -10,12 +10,14 @@ import numpy as np
 import pytest
 from inside import (
     ConstantEnvironment,
+    DeformingLights,
     DirectionalLights,
     EnvironmentSum,
     GlowLights,
     IESLights,
     ImageEnvironment,
     LightRecord,
+    MovingLights,
     OctahedralEnvironment,
     PatchedEnvironment,
     Photometry,
@@ -124,7 +126,10 @@ kinds = pytest.mark.parametrize("kind", LIGHTS, ids=lambda kind: kind.__name__)
 
 
 def test_every_light_is_here() -> None:
-    """`GlowLights` are points in a volume, which no ray meets: their samples are in `test_glow.py`."""
+    """`GlowLights` are points in a volume, which no ray meets: their samples are in `test_glow.py`.
+
+    Lights that move are those that stand still at a time: tests/motion/test_moving_lights.py.
+    """
     modules = [
         import_module(f"{lights.__name__}.{each.name}") for each in pkgutil.iter_modules(lights.__path__)
     ]
@@ -134,7 +139,7 @@ def test_every_light_is_here() -> None:
         for each in vars(module).values()
         if isinstance(each, type) and issubclass(each, LightRecord) and not isabstract(each)
     }
-    assert found == {*LIGHTS, GlowLights}
+    assert found == {*LIGHTS, GlowLights, MovingLights, DeformingLights}
 
 
 @kinds

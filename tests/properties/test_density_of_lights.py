@@ -142,6 +142,7 @@ def test_every_light_is_here() -> None:
         *("TexturedSphereLights", "ImageEnvironment", "ConstantEnvironment", "EnvironmentSum", "SkyLight"),
         "PatchedEnvironment",
         "OctahedralEnvironment",  # in tests/lights/test_octahedral.py
+        *("MovingLights", "DeformingLights"),  # in tests/motion/test_moving_lights.py
         "GlowLights",  # points in a volume, in tests/lights/test_glow.py
         *("DirectionalLights", "PointLightRecord", "SpotLights", "PicturedLights", "IESLights"),
     }

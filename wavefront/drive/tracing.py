@@ -90,6 +90,7 @@ class Tracer:
         self,
         scene: CompiledScene,
         camera: Camera,
+        sampler: Sampler,
         pixels: Words,
         samples: Words,
         recorder: PathRecorder = NOBODY,
@@ -99,14 +100,13 @@ class Tracer:
 
         Parameters
         ----------
-        scene, camera
+        scene, camera, sampler
             As the view has them.
         recorder
             Looks on.
         tiles
             Those whose pixels share paths; None where none do.
         """
-        sampler = self.sampler(camera.resolution[0])
         paths = generate(scene, camera, sampler, pixels, samples, self.filter)
         recorder.prepare(paths)
         integrator = integrator_for(self.integrator, tiles)
@@ -138,15 +138,14 @@ def _trace_wave(tracer: Tracer, monitor: WaveMonitor, job: Job) -> WaveResult:
     scene = seen_with(whole, tracer.table if job.view.guided else None, job.view.branches)
     pixels, samples, tiles = np.tile(job.pixels, n), _samples(job), job.view.tiles
     recorder = SampleRecorder(tracer.layers, scene, k * n, tracer.clamp) if tracer.layers else None
-    radiance = tracer.radiance(scene, camera, pixels, samples, recorder or NOBODY, tiles)
+    sampler = tracer.sampler(camera.resolution[0])
+    radiance = tracer.radiance(scene, camera, sampler, pixels, samples, recorder or NOBODY, tiles)
     finite = np.logical_and.reduce(np.isfinite(radiance))
     if recorder is not None:
         finite &= recorder.finish(integrator_for(tracer.integrator, tiles), radiance)
     splats = None
     if scene.specular_surfaces is not None:
-        splats = trace_light(
-            whole, camera, tracer.sampler(camera.resolution[0]), pixels, samples, tracer.max_bounces
-        )
+        splats = trace_light(whole, camera, sampler, pixels, samples, tracer.max_bounces)
         good = np.isfinite(splats.radiance).all(0)
         finite[splats.path[~good]] = False
         splats = splats.take(np.flatnonzero(good))

@@ -169,7 +169,8 @@ class Wave:
         self, scene: CompiledScene, numbers: Ints, samples: Words, recorder: PathRecorder = NOBODY
     ) -> Floats:
         """Return the light (3, n) of samples (n,) of pixels (n,), with a recorder that looks on."""
-        return self.tracer.radiance(scene, self.camera, numbers.astype(np.uint32), samples, recorder)
+        sampler, pixels = self.tracer.sampler(self.camera.resolution[0]), numbers.astype(np.uint32)
+        return self.tracer.radiance(scene, self.camera, sampler, pixels, samples, recorder)
 
 
 class Onlooker(PathRecorder):
