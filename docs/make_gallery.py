@@ -41,7 +41,7 @@ PICTURES = {  # size, samples per pixel, whether it is denoised, whether it has 
     "depth_of_field": (1200, 40, True, True),
     "environment": (1200, 64, True, True),
     "own_material": (1200, 20, True, True),
-    "material_sheet": (1200, 40, True, False),
+    "material_sheet": (1200, 8, True, False),
     "skies": (400, 24, True, False),
     "office": (480, 40, True, False),
     "layers": (297, 96, False, False),

@@ -10,12 +10,22 @@ from __future__ import annotations
 import argparse
 
 import numpy as np
+from PIL import Image as Picture
+from PIL import ImageDraw, ImageFont
 
 import wavefront as wf
 
 RADIUS = 0.42
 TREAD, RISER = 1.15, 0.58  # of a step, scene units
 ELEVATION = 25  # of the camera, degrees
+LABELS = (  # of three balls each
+    ("Diffuse, DiffuseTransmission, Sides", "OrenNayar: sigma 0.3, 0.6, 1", "OrenNayar, energy preserving"),
+    ("Conductor gold: roughness 0, 0.3, 0.6", "Conductor copper", "Conductor aluminum"),
+    ("Dielectric: roughness 0, 0.25, 0.5", "ThinDielectric", "Dielectric around a Medium"),
+    ("Disney: metallic 0, 1; ThinDisney", "Principled: clearcoat 0, 0.5, 1", "Principled: sheen 0, 0.5, 1"),
+    ("Principled: transmission 0.3, 0.65, 1", "Plastic: roughness 0.1, 0.35, 0.8", "Mix: 25, 50, 75 % gold"),
+    ("Texture: color, roughness, Mix", "BumpMap, BumpMap, NormalMap", "alpha: 0.45, Texture, cutoff"),
+)
 CLAY, SKY, WINE = (0.75, 0.33, 0.2), (0.16, 0.4, 0.68), (0.45, 0.05, 0.09)
 
 
@@ -154,11 +164,27 @@ def scene(size: int = 900) -> wf.Scene:
     return wf.Scene([*shapes, panel], [wf.Environment(studio())], camera)
 
 
+def labeled(image: wf.Image, camera: wf.Camera) -> Picture.Image:
+    """Return the picture with a label for each three balls, on the step before them."""
+    places = [
+        (3.3 * group, step * RISER, (0.96 - step) * TREAD)
+        for step in reversed(range(len(LABELS)))
+        for group in (-1, 0, 1)
+    ]
+    picture = Picture.fromarray(image.to_uint8())
+    draw, font = ImageDraw.Draw(picture), ImageFont.load_default(max(image.shape[1] / 80, 5))
+    for at, label in zip(camera.project(places)[0], (each for row in LABELS for each in row), strict=True):
+        draw.text(tuple(at), label, "white", font, anchor="mb", stroke_width=1, stroke_fill=(60, 58, 56))
+    return picture
+
+
 if __name__ == "__main__":
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("output", nargs="?", default="material_sheet.png")
     parser.add_argument("--spp", type=int, default=128)
     parser.add_argument("--size", type=int, default=900)
     options = parser.parse_args()
-    wf.render(scene(options.size), options.spp, filter="gaussian").save(options.output)
+    sheet = scene(options.size)
+    image = wf.render(sheet, options.spp, filter="gaussian")
+    labeled(image, sheet.camera).save(options.output)
     print(f"wrote {options.output}")
