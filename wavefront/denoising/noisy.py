@@ -46,9 +46,10 @@ class NoisyPicture:
 
     @property
     def clean(self) -> Bools:
-        """Return which pixels (H, W) have no error, or one that nobody sees and most pixels about them too.
+        """Return which pixels (H, W) have an error that nobody sees, or none, and most pixels about them too.
 
-        Black ones are not among them: samples that have met no light do not tell whether there is some.
+        A few samples of a pixel may agree by chance. Black pixels are not among them: samples that have met
+        no light do not tell whether there is some.
         """
         if self.error is None:
             return np.zeros(self.rgb.shape[:2], np.bool_)
@@ -56,7 +57,7 @@ class NoisyPicture:
         small = (brightest > 0) & (error <= UNSEEN * brightest)
         wide = np.pad(small, 1, mode="symmetric").astype(np.uint8)
         rows = wide[:-2] + wide[1:-1] + wide[2:]
-        return small & ((error == 0) | (rows[:, :-2] + rows[:, 1:-1] + rows[:, 2:] >= AGREE))
+        return small & (rows[:, :-2] + rows[:, 1:-1] + rows[:, 2:] >= AGREE)
 
 
 def _greatest(values: Floats) -> Floats:
