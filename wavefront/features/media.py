@@ -13,13 +13,12 @@ from ..arrays.vec import Bools, Floats, Ints, highest, take
 from ..compile.media import stacks_leaving
 from ..compile.program import Facts, Feature, Leg, Passage
 from ..compile.scene import CompiledScene
-from ..sampling.sampler import Sampler
 from ..stages.accumulate import accumulate
 from ..stages.inside import stacks_at
 from ..stages.interaction import Surfaces
 from ..stages.intersect import ShadowRays
 from ..stages.medium import begin_in_media, cross, crossings, dim, fly
-from ..stages.shade import Shading
+from ..stages.shade import LightRays, Shading
 
 
 class ShadingInMedia(Shading):
@@ -41,23 +40,13 @@ class ShadingInMedia(Shading):
             cos[self.volume] = cos_g[self.volume] = 1
         return cos, cos_g
 
-    def enter(
-        self,
-        scene: CompiledScene,
-        rays: ShadowRays,
-        paths: Paths,
-        lanes: Ints,
-        light: Ints,
-        cos_g: Floats,
-        sampler: Sampler,
-        bounce: int,
-    ) -> None:
+    def enter(self, rays: ShadowRays, of: LightRays) -> None:
         """Note what shadow rays begin inside of."""
-        super().enter(scene, rays, paths, lanes, light, cos_g, sampler, bounce)
-        stack = paths.media[:, : cos_g.size]
+        super().enter(rays, of)
+        stack = of.paths.media[:, : of.cos_g.size]
         if self.crossing is not None:
-            stack = stacks_leaving(stack, self.crossing, cos_g)
-        begin_in_media(scene, rays, paths, stack, lanes, light, sampler, bounce)
+            stack = stacks_leaving(stack, self.crossing, of.cos_g)
+        begin_in_media(of.scene, rays, of.paths, stack, of.lanes, of.light, of.sampler, of.bounce)
 
     def leave(self, paths: Paths, left: Paths, cos_g: Floats, bounce: int) -> None:
         """Note what paths have entered and left."""

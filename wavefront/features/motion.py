@@ -7,7 +7,7 @@ from typing import Self
 import numpy as np
 
 from ..arrays.soa import soa
-from ..arrays.state import Hits, Paths, Rays, SurfaceInteraction, Words
+from ..arrays.state import Hits, Rays, SurfaceInteraction, Words
 from ..arrays.vec import Doubles, Floats, Ints, f4, normalize
 from ..camera import Camera
 from ..camera.poses import upright
@@ -15,10 +15,9 @@ from ..compile.program import Facts, Feature
 from ..compile.scene import CompiledScene
 from ..motion.shutter import Shutter
 from ..motion.steps import Motions, applied, inverse_linear, moved_back, transposed_turned
-from ..sampling.sampler import Sampler
 from ..stages.interaction import Surfaces
 from ..stages.intersect import ShadowRays
-from ..stages.shade import Shading
+from ..stages.shade import LightRays, Shading
 
 
 class DeformingSurfaces(Surfaces):
@@ -160,21 +159,11 @@ class MovingShading(Shading):
 
     __slots__ = ()
 
-    def enter(
-        self,
-        scene: CompiledScene,
-        rays: ShadowRays,
-        paths: Paths,
-        lanes: Ints,
-        light: Ints,
-        cos_g: Floats,
-        sampler: Sampler,
-        bounce: int,
-    ) -> None:
+    def enter(self, rays: ShadowRays, of: LightRays) -> None:
         """Let shadow rays have the times of their paths."""
-        super().enter(scene, rays, paths, lanes, light, cos_g, sampler, bounce)
-        if paths.time is not None:
-            rays.time = paths.time.take(lanes)
+        super().enter(rays, of)
+        if of.paths.time is not None:
+            rays.time = of.paths.time.take(of.lanes)
 
 
 class Motion(Feature):

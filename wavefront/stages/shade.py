@@ -43,6 +43,19 @@ class Guidance:
 
 
 @soa
+class LightRays:
+    """Which shadow rays leave some lanes of surfaces, for lights."""
+
+    scene: CompiledScene
+    paths: Paths  # at the surfaces, n or more: those that light samples reach come first
+    lanes: Ints  # (k,) where the rays start
+    light: Ints  # (k,) numbers of the lights that they lead to
+    cos_g: Floats  # (n,) cosines of directions to lights with `ng`
+    sampler: Sampler
+    bounce: int
+
+
+@soa
 class Shading:
     """Surfaces prepared for shading: local frames, and the lanes of each group of materials."""
 
@@ -145,18 +158,8 @@ class Shading:
         """
         return pdf
 
-    def enter(
-        self,
-        scene: CompiledScene,
-        rays: ShadowRays,
-        paths: Paths,
-        lanes: Ints,
-        light: Ints,
-        cos_g: Floats,
-        sampler: Sampler,
-        bounce: int,
-    ) -> None:
-        """Give shadow rays (k) of some lanes, which lead to lights (k,), the columns that they need."""
+    def enter(self, rays: ShadowRays, of: LightRays) -> None:
+        """Give shadow rays (k) the columns that they need."""
 
     def aim(
         self, paths: Paths, sample: BsdfSample, sampler: Sampler, bounce: int
@@ -291,7 +294,7 @@ def direct(
     rays = shadow_rays(shade.surface, origin, light, lanes)
     number = take(number, lanes)
     rays.exclude_prim = shade.unmet(rays.exclude_prim, rays.direction, lanes)
-    shade.enter(scene, rays, paths, lanes, number, cos_g, sampler, bounce)
+    shade.enter(rays, LightRays(scene, paths, lanes, number, cos_g, sampler, bounce))
     radiance = radiance_at_samples(scene, rays, light, lanes, number)
     if scene.program.dims_shadows:
         radiance = radiance * transmittance_along(scene, rays)
