@@ -11,7 +11,7 @@ from .primitives import CurvedPrimitives
 from .sphere import SpherePrimitives
 from .triangle import ROUNDOFF
 
-MOST = 4  # each costs a ray about 15 ns; the matrix product and what leads to it cost 100
+MOST = 4  # each costs a ray about 15 ns; the matrix product and its preparation cost 100
 MARGIN = f4(64 * ROUNDOFF)  # of squared lengths, more than all rounding errors together
 
 

@@ -67,7 +67,7 @@ class Accelerator(Protocol):
     array([3.], dtype=float32)
     """
 
-    name: str  # what the metadata of pictures calls it
+    name: str  # in the metadata of pictures
 
     @abstractmethod
     def closest(self, origin: Floats, direction: Floats, exclude_prim: Ints) -> Intersections:

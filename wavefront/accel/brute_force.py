@@ -86,7 +86,7 @@ class BruteForceTriangles:
         diagonal: Floats | None,
         ball: Ball,
     ) -> None:
-        polygons = [each for each in polygons if each.prim.size]
+        polygons = [kind for kind in polygons if kind.prim.size]
         self._table, self._partner, self._diagonal = table, partner, diagonal
         self._matrices, begin = [], 0
         plane_parts, side_rows = [], []
@@ -148,28 +148,30 @@ class BruteForceTriangles:
         ]
         return cls(table, polygons, partner, diagonal, ball)
 
-    def find_hits(self, batch: RayBatch, found: HitAccumulator) -> None:
-        """Add all hits to `found`; those of a quadrilateral as hits of its first triangle."""
+    def find_hits(self, batch: RayBatch, accumulator: HitAccumulator) -> None:
+        """Add all hits to `accumulator`; those of a quadrilateral as hits of its first triangle."""
         if not self._count:
             return
-        tests = TriangleTests(self._table, batch, found, self._partner)
+        tests = TriangleTests(self._table, batch, accumulator, self._partner)
         further: list[tuple[Ints, Bytes]] = []
-        for part, exclude_prim in self._parts(batch):
-            value, met = self._filter(batch, part, exclude_prim)
+        for lanes, exclude_prim in self._parts(batch):
+            value, met = self._filter(batch, lanes, exclude_prim)
             certain = np.greater(value, 1, out=scratch("certain", met.shape, np.bool_))
             certain &= met
             hits = _sum(certain)
-            self._add_uncertain(met, certain, np.flatnonzero(hits != _sum(met)), tests, part.start)
+            self._add_uncertain(met, certain, np.flatnonzero(hits != _sum(met)), tests, lanes.start)
             number = certain.view(np.uint8)
             number *= self._number
             highest = np.maximum.reduce(number, 0).astype(np.intp)
-            t = triangle.plane_distance(self._plane, highest, batch.origin[:, part], batch.direction[:, part])
-            found.add_slice(part, self._prim_or_first.take(highest), t)
+            t = triangle.plane_distance(
+                self._plane, highest, batch.origin[:, lanes], batch.direction[:, lanes]
+            )
+            accumulator.add_slice(lanes, self._prim_or_first.take(highest), t)
             several = np.flatnonzero(hits > 1)
             number = number.take(several, 1)
             number[highest.take(several) - 1, np.arange(several.size)] = 0
-            further.append((several + part.start, number))
-        self._add_further_hits(further, batch, found)
+            further.append((several + lanes.start, number))
+        self._add_further_hits(further, batch, accumulator)
         tests.finish()
 
     def _add_uncertain(
@@ -182,7 +184,7 @@ class BruteForceTriangles:
             tests.add_uncertain(self._prim.take(slot + 1), lane.take(place) + first_lane)
 
     def _add_further_hits(
-        self, further: list[tuple[Ints, Bytes]], batch: RayBatch, found: HitAccumulator
+        self, further: list[tuple[Ints, Bytes]], batch: RayBatch, accumulator: HitAccumulator
     ) -> None:
         """Add the remaining certain hits: lanes (c,), and numbers (m, c) of their polygons, 0 for none."""
         lane = np.concatenate([lane for lane, _ in further])
@@ -195,23 +197,23 @@ class BruteForceTriangles:
                 lane, number, chosen = lane.take(left), number.take(left, 1), chosen.take(left)
                 origin, direction = origin.take(left, 1), direction.take(left, 1)
             t = triangle.plane_distance(self._plane, chosen, origin, direction)
-            found.add(lane, self._prim.take(chosen), t)
+            accumulator.add(lane, self._prim.take(chosen), t)
             number[chosen - 1, np.arange(lane.size)] = 0
 
-    def find_blocked(self, batch: RayBatch, found: AnyHit) -> None:
-        """Mark the blocked lanes in `found`."""
+    def find_blocked(self, batch: RayBatch, accumulator: AnyHit) -> None:
+        """Mark the blocked lanes in `accumulator`."""
         if batch.start is None or batch.end is None or not self._count:
-            return self.find_hits(batch, found)
-        tests = TriangleTests(self._table, batch, found, self._partner)
+            return self.find_hits(batch, accumulator)
+        tests = TriangleTests(self._table, batch, accumulator, self._partner)
         uncertain = Candidates(tests.add)
         start_rows, end_rows = self._planes.rows(
             *(np.maximum(points[:3].max(1), -points[:3].min(1)) for points in (batch.start, batch.end))
         )
-        for part, exclude_prim in self._parts(batch):
-            value = self._lines(batch, part, None)
+        for lanes, exclude_prim in self._parts(batch):
+            value = self._lines(batch, lanes, None)
             m, k = value.shape
-            start = np.matmul(start_rows, batch.start[:, part], out=scratch("side", (m, k)))
-            end = np.matmul(end_rows, batch.end[:, part], out=scratch("end side", (m, k)))
+            start = np.matmul(start_rows, batch.start[:, lanes], out=scratch("side", (m, k)))
+            end = np.matmul(end_rows, batch.end[:, lanes], out=scratch("end side", (m, k)))
             padded = scratch("least", (m + 1, k))  # the first row is for no polygon
             # Above 1: the line certainly passes inside, and the ends are certainly on different sides.
             least = np.maximum(start, end, out=padded[1:])
@@ -222,12 +224,12 @@ class BruteForceTriangles:
                 padded.reshape(-1)[exclude_prim] = -2
             most = np.maximum.reduce(least, 0)
             blocked = most > 1
-            found.blocked[part] |= blocked
+            accumulator.blocked[lanes] |= blocked
             rest = np.flatnonzero((most >= -1) > blocked)
             slot, place = np.divmod(flat_true(least.take(rest, 1) >= -1), max(rest.size, 1))
             lane = rest.take(place)
             uncertain.add(
-                self._prim.take(slot + 1), lane + part.start, value.reshape(-1).take(slot * k + lane)
+                self._prim.take(slot + 1), lane + lanes.start, value.reshape(-1).take(slot * k + lane)
             )
         uncertain.flush()
         tests.finish()
@@ -241,23 +243,23 @@ class BruteForceTriangles:
         step = -(-n // parts)
         step += -step % 16
         for at in range(0, n, step):
-            part = slice(at, min(at + step, n))
+            lanes = slice(at, min(at + step, n))
             if excluded is None:
-                yield part, None
+                yield lanes, None
                 continue
-            k = part.stop - at
-            flat = excluded[part] * k
+            k = lanes.stop - at
+            flat = excluded[lanes] * k
             flat += np.arange(k)
-            yield part, flat
+            yield lanes, flat
 
-    def _filter(self, batch: RayBatch, part: slice, exclude_prim: Ints | None) -> tuple[Floats, Bools]:
+    def _filter(self, batch: RayBatch, lanes: slice, exclude_prim: Ints | None) -> tuple[Floats, Bools]:
         """Return the filter's values (m, k) of a slice of the batch, and a mask (m, k) of possible hits."""
         if batch.start is None:
-            value = least = self._lines(batch, part, None)
+            value = least = self._lines(batch, lanes, None)
         else:
-            points = batch.start[:, part]
+            points = batch.start[:, lanes]
             side = np.matmul(self._side_rows, points, out=scratch("side", (self._count, points.shape[1])))
-            value = self._lines(batch, part, side)
+            value = self._lines(batch, lanes, side)
             least = np.minimum(value, side, out=side)
         met = scratch("met", (self._count + 1, value.shape[1]), np.bool_)  # the first row is for no polygon
         np.greater_equal(least, -1, out=met[1:])
@@ -265,9 +267,9 @@ class BruteForceTriangles:
             met.reshape(-1)[exclude_prim] = False
         return value, met[1:]
 
-    def _lines(self, batch: RayBatch, part: slice, side: Floats | None) -> Floats:
+    def _lines(self, batch: RayBatch, lanes: slice, side: Floats | None) -> Floats:
         """Return the values (m, k) of `EdgeMatrix.test` for a slice of the batch."""
-        line = batch.line[:, part]
+        line = batch.line[:, lanes]
         value = scratch("value", (self._count, line.shape[1]))
         for matrix in self._matrices:
             matrix.test(line, None if side is None else side[matrix.at], value[matrix.at])

@@ -199,11 +199,11 @@ def _split_huge(ids: Ints, low: Floats, high: Floats, leaf_size: int) -> tuple[I
     sample = ids[:: ids.size // SAMPLE]
     alone, count = np.zeros(1, np.intp), np.array([sample.size])
     best_cost, axis, place = np.inf, 0, sample.size // 2
-    for each in range(3):
-        middle = low[each].take(sample) + high[each].take(sample)
+    for candidate in range(3):
+        middle = low[candidate].take(sample) + high[candidate].take(sample)
         cost, split = _best_split(sample.take(middle.argsort()), alone, count, low, high, leaf_size)
         if cost[0] < best_cost:
-            best_cost, axis, place = float(cost[0]), each, int(split[0])
+            best_cost, axis, place = float(cost[0]), candidate, int(split[0])
     split_at = leaf_size * round(place / sample.size * ids.size / leaf_size)
     middle = low[axis].take(ids) + high[axis].take(ids)
     return ids.take(np.argpartition(middle, split_at)), split_at

@@ -47,11 +47,11 @@ def scratch(name: str, shape: tuple[int, ...], dtype: type = f4) -> NDArray[Any]
     A name must always be used with the same type.
     """
     size = math.prod(shape)
-    held = getattr(_memory, name, None)
-    if held is None or held.size < size:
-        held = np.empty(size, dtype)
-        setattr(_memory, name, held)
-    return held[:size].reshape(shape)
+    buffer = getattr(_memory, name, None)
+    if buffer is None or buffer.size < size:
+        buffer = np.empty(size, dtype)
+        setattr(_memory, name, buffer)
+    return buffer[:size].reshape(shape)
 
 
 def flat_true(mask: Bools) -> Ints:
@@ -251,9 +251,9 @@ def build_bvh(primitives: Bounded, ids: Ints, leaf_size: int, width: int, ball: 
 def _boxes(primitives: Bounded, ids: Ints) -> tuple[Floats, Floats]:
     """Return the lower and upper corners (3, m) of the boxes of primitives `ids` (m,)."""
     low, high = np.empty((3, ids.size), f4), np.empty((3, ids.size), f4)
-    for part in spans(ids.size, AT_ONCE):
-        points = primitives.take(ids[part]).hull()
-        low[:, part], high[:, part] = points.min(0), points.max(0)
+    for span in spans(ids.size, AT_ONCE):
+        points = primitives.take(ids[span]).hull()
+        low[:, span], high[:, span] = points.min(0), points.max(0)
     return low, high
 
 
@@ -276,8 +276,8 @@ def _inner_quadrics(shape: Doubles, child: Ints, absent: Bools) -> tuple[Floats,
     center[child[inner]] = of_child[:, :3]
     radius[child[inner]] = np.linalg.norm(of_child[:, 3:], axis=1)
     quadrics = np.empty((nodes, width, len(PAIRS)), f4)
-    for part in spans(nodes, AT_ONCE // width):
-        quadrics[part] = quadric_rows(shape[part], center[part], radius[part])
+    for span in spans(nodes, AT_ONCE // width):
+        quadrics[span] = quadric_rows(shape[span], center[span], radius[span])
     quadrics[absent] = 0
     for axis in range(3):
         quadrics[absent, PAIRS.index((axis, axis))] = -1

@@ -24,11 +24,11 @@ class AcceleratorCache:
         self._kept: dict[str, tuple[AcceleratorMaker, list[tuple[Geometry, Accelerator]]]] = {}
 
     def __reduce__(self) -> tuple[type[AcceleratorCache], tuple[()]]:
-        """Leave behind what was built: some of it is memory of Embree's."""
+        """Leave the accelerators behind: some hold memory of Embree's."""
         return AcceleratorCache, ()
 
     def maker(self, accel: str | AcceleratorMaker) -> Callable[[Geometry], Accelerator]:
-        """Return what makes the accelerators of one render, given by name or class, one after the other.
+        """Return a maker of the accelerators of one render, given by name or class, one after the other.
 
         Raises
         ------
@@ -43,12 +43,12 @@ class AcceleratorCache:
         self._kept[label] = kind, now
 
         def make(geometry: Geometry) -> Accelerator:
-            kept = before.popleft() if before else None
-            if kept is None or not _same(kept[0], geometry):
-                kept = None  # frees its memory
-                kept = geometry, make_accelerator(geometry, accel)
-            now.append(kept)
-            return kept[1]
+            cached = before.popleft() if before else None
+            if cached is None or not _same(cached[0], geometry):
+                cached = None  # frees its memory
+                cached = geometry, make_accelerator(geometry, accel)
+            now.append(cached)
+            return cached[1]
 
         return make
 
@@ -56,7 +56,7 @@ class AcceleratorCache:
 def _same(a: Any, b: Any) -> bool:
     """Return whether two records of arrays, such as geometries, are of one class and equal."""
     return type(a) is type(b) and all(
-        _equal(getattr(a, each.name), getattr(b, each.name)) for each in fields(a)
+        _equal(getattr(a, field.name), getattr(b, field.name)) for field in fields(a)
     )
 
 

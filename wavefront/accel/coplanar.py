@@ -111,14 +111,14 @@ def _plane_numbers(triangles: Floats, ids: Ints, plane: Doubles) -> Floats:
     width = min(COARSEST, 0.5 / np.sqrt(ids.size))
     out = np.empty((3, ids.size), f4)
     farthest = 0.0
-    for part in spans(ids.size, AT_ONCE):
-        some = plane.take(ids[part], 1)
+    for span in spans(ids.size, AT_ONCE):
+        some = plane.take(ids[span], 1)
         some /= length(some[:3])
         p, q, r = (row[0] * some[0] + row[1] * some[1] + row[2] * some[2] for row in ROTATION)
-        out[0, part] = p * q / width
-        out[1, part] = (q * r - 0.7 * p * p) / width
-        out[2, part] = some[3] * (p + 0.6 * q + 0.3 * r)
-        farthest = max(farthest, float(np.abs(triangles.take(ids[part], 0)).max()))
+        out[0, span] = p * q / width
+        out[1, span] = (q * r - 0.7 * p * p) / width
+        out[2, span] = some[3] * (p + 0.6 * q + 0.3 * r)
+        farthest = max(farthest, float(np.abs(triangles.take(ids[span], 0)).max()))
     out[2] *= f4(1 / (width * farthest))
     return out
 
@@ -126,12 +126,12 @@ def _plane_numbers(triangles: Floats, ids: Ints, plane: Doubles) -> Floats:
 def _cells(numbers: Floats, shift: float, count: int) -> Keys:
     """Return keys (k,) of the cells that numbers (3, k) are in."""
     keys = np.zeros(count, np.uint64)
-    for part in spans(count, AT_ONCE):
+    for span in spans(count, AT_ONCE):
         key = np.zeros(1, np.uint64)
-        for cell, factor in zip(np.floor(numbers[:, part] + f4(shift)), FACTORS, strict=True):
+        for cell, factor in zip(np.floor(numbers[:, span] + f4(shift)), FACTORS, strict=True):
             key = (key + cell.astype(np.int64).view(np.uint64)) * factor
             key = key ^ (key >> np.uint64(29))
-        keys[part] = key * FACTORS[0]
+        keys[span] = key * FACTORS[0]
     return keys
 
 
@@ -140,8 +140,8 @@ def _without_parts(member: Ints, start: Ints, before: list[Keys]) -> tuple[Ints,
     for keys in before:
         if not member.size:
             break
-        own = keys.take(member)
-        new = np.minimum.reduceat(own, start) != np.maximum.reduceat(own, start)
+        member_keys = keys.take(member)
+        new = np.minimum.reduceat(member_keys, start) != np.maximum.reduceat(member_keys, start)
         count = np.diff(start, append=member.size)
         member, count = member.compress(np.repeat(new, count)), count.compress(new)
         start = np.cumsum(count) - count
@@ -164,8 +164,8 @@ def _overlapping_in_runs(triangles: Floats, face: Ints, plane: Doubles, start: I
     following[dense.take(run.take(box))] = 0
     ends = np.cumsum(following)
     shift = np.arange(1, box.size + 1) + following - ends  # from a number of a pair to its second place
-    for part in spans(int(ends[-1]), AT_ONCE):
-        number = np.arange(part.start, part.stop)
+    for span in spans(int(ends[-1]), AT_ONCE):
+        number = np.arange(span.start, span.stop)
         at = np.searchsorted(ends, number, "right")
         one, other = box.take(at), box.take(number + shift.take(at))
         # two boxes may share several strips: the lowest counts
@@ -220,11 +220,11 @@ def _flattened(
     axis = np.abs(plane[:3].take(face.take(start), 1)).argmax(0)
     axes = np.repeat(AXES.T.astype(np.int8).take(axis, 0), count, 0)
     out, across = np.empty((face.size, 3, 2), f4), np.empty((2, face.size), f4)
-    for part in spans(face.size, AT_ONCE):
-        corners = triangles.take(face[part], 0)
-        turned = np.take_along_axis(corners, axes[part, None].astype(np.intp), 2)
-        out[part] = turned[:, :, :2]
-        across[:, part] = _extent(*turned[:, :, 2].T)
+    for span in spans(face.size, AT_ONCE):
+        corners = triangles.take(face[span], 0)
+        turned = np.take_along_axis(corners, axes[span, None].astype(np.intp), 2)
+        out[span] = turned[:, :, :2]
+        across[:, span] = _extent(*turned[:, :, 2].T)
     return out, across
 
 
@@ -247,10 +247,10 @@ def _that_overlap(triangles: Floats, face: Ints, corners: Floats, first: Ints, s
     `corners` (r, 3, 2) are those of the faces in a plane that is not far from theirs.
     """
     pair = np.stack([first, second])
-    flat = (np.ascontiguousarray(corners.take(each, 0).transpose(1, 2, 0), np.float64) for each in pair)
+    flat = (np.ascontiguousarray(corners.take(places, 0).transpose(1, 2, 0), np.float64) for places in pair)
     pair = pair.compress(~_apart(*flat), 1)
     if pair.size:
-        solid = (triangles.take(each, 0).transpose(1, 2, 0) for each in face.take(pair))
+        solid = (triangles.take(ids, 0).transpose(1, 2, 0) for ids in face.take(pair))
         pair = pair.compress(_coplanar(*solid), 1)
     return pair
 

@@ -21,7 +21,7 @@ class CylinderPrimitives(SegmentPrimitives):
     def distance(self, prim: Ints, origin: Doubles, direction: Doubles, leaves: Bools) -> Doubles:
         """Return the least t > 0 (n,) at which rays (3, n) hit cylinders, inf on a miss.
 
-        A closed cylinder is what the endless one and the slab between its ends have in common.
+        A closed cylinder is the intersection of the endless one and the slab between its ends.
         """
         cut = self.cut(prim, origin, direction)
         low, high = self.slab(prim, cut)

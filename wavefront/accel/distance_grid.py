@@ -63,9 +63,9 @@ class DistanceGridPrimitives(CurvedPrimitives):
         ends = np.cumsum([0, *(values.size for values in shared.values())])
         begins = dict(zip(shared, ends.tolist(), strict=False))
         boxes, frames = [shape.boxes() for shape in shapes], [shape.frame for shape in shapes]
-        middle = np.concatenate([each[0] for each in boxes], 1) - center[:, None]
-        half = np.concatenate([each[1] for each in boxes], 1)
-        steps = np.stack([each[0] for each in frames], 2)
+        middle = np.concatenate([box[0] for box in boxes], 1) - center[:, None]
+        half = np.concatenate([box[1] for box in boxes], 1)
+        steps = np.stack([frame[0] for frame in frames], 2)
         x, y, z = steps.transpose(1, 0, 2)
         return cls(
             low=(middle - half).astype(f4),
@@ -77,7 +77,7 @@ class DistanceGridPrimitives(CurvedPrimitives):
             size=np.array([shape.values.shape[::-1] for shape in shapes], np.intp).T,
             steps=steps.reshape(9, -1),
             inverse=np.concatenate([cross(y, z), cross(z, x), cross(x, y)]) / dot(x, cross(y, z)),
-            origin=np.stack([each[1] for each in frames], 1) - center[:, None],
+            origin=np.stack([frame[1] for frame in frames], 1) - center[:, None],
             smooth=np.array([shape.smooth for shape in shapes], np.bool_),
         )
 
@@ -88,7 +88,7 @@ class DistanceGridPrimitives(CurvedPrimitives):
 
     def filter_rows(self, ball: Ball) -> Floats:
         """Return the rows (1, k, 11) of balls around the boxes."""
-        centers, radii = (each.astype(np.float64) for each in self.balls)
+        centers, radii = (array.astype(np.float64) for array in self.balls)
         return sphere_rows(centers, radii, ball.center, ball.radius)[None]
 
     def features(self, line: Floats, ball: Ball) -> Floats:
@@ -110,7 +110,7 @@ class DistanceGridPrimitives(CurvedPrimitives):
         met = np.flatnonzero(begin <= end)
         grid, cell = grid.take(met), take(cell, met)
         start, along, begin, end, enter, leave = (
-            take(each, met) for each in (start, along, begin, end, enter, leave)
+            take(array, met) for array in (start, along, begin, end, enter, leave)
         )
         ahead = along > 0
         near = np.where(enter == begin, ~ahead, np.clip(start + begin * along - cell, 0, 1))
@@ -124,7 +124,7 @@ class DistanceGridPrimitives(CurvedPrimitives):
     def surface(self, prim: Ints, point: Floats, error: Floats) -> Floats:
         """Return the unit normals (3, n) of the outside, and move the points onto the surface in their cells.
 
-        By Newton's method, whose last step would be as long as what is added to the error.
+        By Newton's method; the error grows by the length of its last step.
         """
         grid, cell = self.grid.take(prim), self.cell.take(prim, 1)
         corners, inverse = self._corners(grid, cell), _of(self.inverse, grid)
@@ -159,9 +159,7 @@ class DistanceGridPrimitives(CurvedPrimitives):
         slopes = [[self._slope(grid, place, axis, side[axis]) for side in sides] for axis in range(3)]
         total = np.zeros_like(place)
         for i, j, k in product((0, 1), repeat=3):
-            share = np.prod(
-                [each if side else 1 - each for side, each in zip((i, j, k), weight, strict=True)], 0
-            )
+            share = np.prod([w if side else 1 - w for side, w in zip((i, j, k), weight, strict=True)], 0)
             total += share * normalize(np.stack([slopes[0][i], slopes[1][j], slopes[2][k]]) * (last + 1))
         bent = normalize(_transposed_times(_of(self.inverse, grid), total / (last + 1))).astype(f4)
         return np.where(_of(self.smooth, grid) & (dot(bent, normal) > 0), bent, normal)
@@ -189,10 +187,10 @@ class DistanceGridPrimitives(CurvedPrimitives):
 
     def _slope(self, grid: Ints, place: Doubles, axis: int, cell: Ints) -> Doubles:
         """Return the differences (n,) between both faces across an axis of cells `cell` (n,) there."""
-        there = np.clip(np.floor(place), 0, _of(self.size, grid) - 2).astype(np.intp)
-        at = place - there
-        there[axis] = cell
-        return _within(self._corners(grid, there), at, axis)
+        cells = np.clip(np.floor(place), 0, _of(self.size, grid) - 2).astype(np.intp)
+        at = place - cells
+        cells[axis] = cell
+        return _within(self._corners(grid, cells), at, axis)
 
 
 def _of(table: Any, number: Ints) -> Any:
@@ -210,16 +208,16 @@ def _transposed_times(m: Doubles, v: Doubles) -> Doubles:
     return np.stack([m[i] * v[0] + m[i + 3] * v[1] + m[i + 6] * v[2] for i in range(3)])
 
 
-def _mixed(a: Doubles, b: Doubles, part: Doubles) -> Doubles:
+def _lerp(a: Doubles, b: Doubles, fraction: Doubles) -> Doubles:
     """Interpolate; exactly a at 0 and b at 1."""
-    return a * (1 - part) + b * part
+    return a * (1 - fraction) + b * fraction
 
 
 def _within(corners: Doubles, at: Doubles, along: int | None = None) -> Doubles:
     """Return values (n,) at points (3, n) of cells with corners (2, 2, 2, n), or their slopes by an axis."""
-    for axis, part in enumerate(at):
+    for axis, fraction in enumerate(at):
         a, b = corners[..., 0, :], corners[..., 1, :]
-        corners = b - a if axis == along else _mixed(a, b, part)
+        corners = b - a if axis == along else _lerp(a, b, fraction)
     return corners
 
 
@@ -230,7 +228,7 @@ def _along_diagonal(corners: Doubles, near: Doubles, far: Doubles) -> Doubles:
     """
     for axis in range(3):
         a, b = corners[:, :, 0], corners[:, :, 1]
-        corners = np.stack([_mixed(a, b, near[axis]), _mixed(a, b, far[axis])])
+        corners = np.stack([_lerp(a, b, near[axis]), _lerp(a, b, far[axis])])
     second = (corners[1, 0, 0] + corners[0, 1, 0] + corners[0, 0, 1]) / 3
     third = (corners[1, 1, 0] + corners[1, 0, 1] + corners[0, 1, 1]) / 3
     return np.stack([corners[0, 0, 0], second, third, corners[1, 1, 1]])
@@ -238,9 +236,9 @@ def _along_diagonal(corners: Doubles, near: Doubles, far: Doubles) -> Doubles:
 
 def _cubic(b: Doubles, s: Doubles) -> tuple[Doubles, Doubles]:
     """Return values (n,) and slopes of cubics by their Bernstein coefficients (4, n), by de Casteljau."""
-    b = _mixed(b[:-1], b[1:], s)
-    low, high = _mixed(b[:-1], b[1:], s)
-    return _mixed(low, high, s), 3 * (high - low)
+    b = _lerp(b[:-1], b[1:], s)
+    low, high = _lerp(b[:-1], b[1:], s)
+    return _lerp(low, high, s), 3 * (high - low)
 
 
 def _first_root(b: Doubles, outside: Bools) -> Doubles:
@@ -282,5 +280,5 @@ def _first_root(b: Doubles, outside: Bools) -> Doubles:
         if not more.size:
             break
         lanes, outside = lanes.take(more), outside.take(more)
-        b, low, high, s = (take(each, more) for each in (b, low, high, better))
+        b, low, high, s = (take(array, more) for array in (b, low, high, better))
     return root

@@ -54,12 +54,12 @@ def repeated(keys: Keys) -> tuple[Ints, Ints]:
 def _keys(triangles: Floats) -> Keys:
     """Return a number for each triangle that does not depend on the order of its corners."""
     keys = np.empty(len(triangles), np.uint64)
-    for part in spans(keys.size, AT_ONCE):
-        rows = np.ascontiguousarray((triangles[part] + np.float32(0)).transpose(2, 1, 0))
+    for span in spans(keys.size, AT_ONCE):
+        rows = np.ascontiguousarray((triangles[span] + np.float32(0)).transpose(2, 1, 0))
         x, y, z = rows.view(np.uint32).astype(np.uint64)
         corners = x * FACTORS[0] + y * FACTORS[1] + z * FACTORS[2]
         corners ^= corners >> np.uint64(29)
         corners *= FACTORS[0]
         corners ^= corners >> np.uint64(32)
-        keys[part] = corners[0] + corners[1] + corners[2]
+        keys[span] = corners[0] + corners[1] + corners[2]
     return keys

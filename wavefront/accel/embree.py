@@ -25,7 +25,7 @@ def installed() -> bool:
     return True
 
 
-LEAST_REACH = 2.0**-20  # what a step is in proportion to, for rays from the origin that hit there
+LEAST_REACH = 2.0**-20  # scale of a step, for rays from the origin that hit there
 
 
 class EmbreeAccelerator:
@@ -68,7 +68,7 @@ class EmbreeAccelerator:
             self._balls = bounding_balls(geometry.curved)
 
     def __reduce__(self) -> tuple[type[EmbreeAccelerator], tuple[Geometry]]:
-        """Pickle what it was built from: Embree's own memory cannot be pickled."""
+        """Pickle the geometry: Embree's own memory cannot be pickled."""
         return EmbreeAccelerator, (self._geometry,)
 
     def closest(self, origin: Floats, direction: Floats, exclude_prim: Ints) -> Intersections:
@@ -118,11 +118,11 @@ class EmbreeAccelerator:
         """Return Embree's nearest hits of rays (3, n)."""
         far = np.full(origin.shape[1], np.inf, f4)
         # Embree reads the transposed views without a copy.
-        found = self._scene.run(origin.T, direction.T, dists=far, query="INTERSECT", output=1)
-        prim, b1, b2 = self._ids.take(found["primID"]), found["u"], found["v"]
+        hits = self._scene.run(origin.T, direction.T, dists=far, query="INTERSECT", output=1)
+        prim, b1, b2 = self._ids.take(hits["primID"]), hits["u"], hits["v"]
         missed = np.flatnonzero(prim < 0)
         b1[missed] = b2[missed] = 0
-        return Intersections(found["tfar"], prim, b1, b2)
+        return Intersections(hits["tfar"], prim, b1, b2)
 
     def _trace_beyond(
         self, origin: Floats, direction: Floats, exclude_prim: Ints, repeat: Ints, hits: Intersections
@@ -140,12 +140,12 @@ class EmbreeAccelerator:
             reach = size + t
             reach[reach == 0] = LEAST_REACH
             t += step * reach
-            found = self._run((start + t * along).astype(f4), along)
-            beyond = (t + found.t).astype(f4)
-            hits.t[repeat], hits.prim[repeat] = beyond, found.prim
-            hits.b1[repeat], hits.b2[repeat] = found.b1, found.b2
+            next_hits = self._run((start + t * along).astype(f4), along)
+            beyond = (t + next_hits.t).astype(f4)
+            hits.t[repeat], hits.prim[repeat] = beyond, next_hits.prim
+            hits.b1[repeat], hits.b2[repeat] = next_hits.b1, next_hits.b2
             repeat = repeat.compress(
-                (found.prim >= 0) & ((found.prim == exclude_prim.take(repeat)) | ~(beyond > 0))
+                (next_hits.prim >= 0) & ((next_hits.prim == exclude_prim.take(repeat)) | ~(beyond > 0))
             )
             step *= 2
 
@@ -187,13 +187,13 @@ class OverlappingFaces:
         if not lanes.size:
             return
         excluded = self._number.take(exclude_prim.take(lanes))
-        found = self._accelerator.closest(origin.take(lanes, 1), direction.take(lanes, 1), excluded)
+        first_hits = self._accelerator.closest(origin.take(lanes, 1), direction.take(lanes, 1), excluded)
         group = self._group.take(self._number.take(hits.prim.take(lanes)))
         # NumPy may miss all of them at an edge, and find something behind
-        same = np.flatnonzero((found.prim >= 0) & (self._group.take(found.prim) == group))
+        same = np.flatnonzero((first_hits.prim >= 0) & (self._group.take(first_hits.prim) == group))
         lanes = lanes.take(same)
-        hits.t[lanes], hits.prim[lanes] = found.t.take(same), self._face.take(found.prim.take(same))
-        hits.b1[lanes], hits.b2[lanes] = found.b1.take(same), found.b2.take(same)
+        hits.t[lanes], hits.prim[lanes] = first_hits.t.take(same), self._face.take(first_hits.prim.take(same))
+        hits.b1[lanes], hits.b2[lanes] = first_hits.b1.take(same), first_hits.b2.take(same)
 
 
 class TrianglePlanes:

@@ -55,19 +55,19 @@ class TrianglePrimitives(Primitives):
         """Return the least products of two edge functions: above 1 where a line certainly hits."""
         return triangle.least_adjacent_product(products, out)
 
-    def tests(self, batch: RayBatch, found: HitAccumulator, first: int) -> TriangleTests:
+    def tests(self, batch: RayBatch, accumulator: HitAccumulator, first: int) -> TriangleTests:
         """Return the exact tests of a batch; triangles have the first ids of a scene."""
-        return TriangleTests(self.table, batch, found)
+        return TriangleTests(self.table, batch, accumulator)
 
 
 class TriangleTests:
-    """Tests of one batch of rays; hits are added to `found`.
+    """Tests of one batch of rays; hits are added to `accumulator`.
 
     Parameters
     ----------
     table
         The triangles.
-    batch, found
+    batch, accumulator
         The rays, and their hits so far.
     partner
         (m,) the second triangle of the quadrilateral whose first triangle this is, -1 for none. None if
@@ -75,11 +75,11 @@ class TriangleTests:
     """
 
     def __init__(
-        self, table: TriangleTable, batch: RayBatch, found: HitAccumulator, partner: Ints | None = None
+        self, table: TriangleTable, batch: RayBatch, accumulator: HitAccumulator, partner: Ints | None = None
     ) -> None:
-        self.table, self.batch, self.found, self.partner = table, batch, found, partner
+        self.table, self.batch, self.accumulator, self.partner = table, batch, accumulator, partner
         # Not a bound method: a reference cycle would keep all rays until the garbage collector runs.
-        self._uncertain = Candidates(partial(_test_uncertain, table, batch, found))
+        self._uncertain = Candidates(partial(_test_uncertain, table, batch, accumulator))
 
     def add(self, prim: Ints, lane: Ints, value: Floats) -> None:
         """Add candidates: triangles (k,), lanes (k,) and the filter's values (k,).
@@ -94,7 +94,7 @@ class TriangleTests:
             certain = np.flatnonzero(~(value <= 1))
             prim, lane = prim.take(certain), lane.take(certain)
         origin, direction = self.batch.origin.take(lane, 1), self.batch.direction.take(lane, 1)
-        self.found.add(lane, prim, triangle.plane_distance(self.table.plane, prim, origin, direction))
+        self.accumulator.add(lane, prim, triangle.plane_distance(self.table.plane, prim, origin, direction))
 
     def add_uncertain(self, prim: Ints, lane: Ints) -> None:
         """Add candidates for the exact test: triangles (k,) and lanes (k,), none that its ray starts on.
@@ -113,7 +113,7 @@ class TriangleTests:
 
 
 def _test_uncertain(
-    table: TriangleTable, batch: RayBatch, found: HitAccumulator, prim: Ints, first: Ints, lane: Ints
+    table: TriangleTable, batch: RayBatch, accumulator: HitAccumulator, prim: Ints, first: Ints, lane: Ints
 ) -> None:
     """Test the pairs (k,) that the filter has left open.
 
@@ -126,4 +126,4 @@ def _test_uncertain(
     t = triangle.plane_distance(table.plane, prim, origin, direction)
     deviation = None if table.deviation is None else table.deviation.take(prim)
     t = triangle.clamp_to_triangle(t, vertices, direction, deviation)
-    found.add(lane, first, np.where(triangle.hits_watertight(vertices, direction), t, np.inf))
+    accumulator.add(lane, first, np.where(triangle.hits_watertight(vertices, direction), t, np.inf))

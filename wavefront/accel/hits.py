@@ -23,7 +23,7 @@ class HitAccumulator(Protocol):
     def add(self, lane: Ints, prim: Ints, t: Doubles) -> None:
         """Add hits of lanes (k,) at t (k,); t <= 0, NaN and inf are misses."""
 
-    def add_slice(self, part: slice, prim: Ints, t: Doubles) -> None:
+    def add_slice(self, lanes: slice, prim: Ints, t: Doubles) -> None:
         """Add one hit of each lane of a slice, (k,)."""
 
     def t_far(self) -> Floats:
@@ -44,9 +44,9 @@ class ClosestHit:
         """Add hits of lanes (k,) at t (k,); t <= 0, NaN and inf are misses."""
         np.minimum.at(self.packed, lane, _pack(prim, t))
 
-    def add_slice(self, part: slice, prim: Ints, t: Doubles) -> None:
+    def add_slice(self, lanes: slice, prim: Ints, t: Doubles) -> None:
         """Add one hit of each lane of a slice, (k,)."""
-        np.minimum(self.packed[part], _pack(prim, t), out=self.packed[part])
+        np.minimum(self.packed[lanes], _pack(prim, t), out=self.packed[lanes])
 
     def t_far(self) -> Floats:
         """Return the distances of the nearest hits, as `bvh.trace` takes them, (n + 1,)."""
@@ -65,10 +65,10 @@ class AnyHit:
         rounded = t.astype(f4)
         self.blocked[lane.compress((rounded > 0) & (rounded < self.distance.take(lane)))] = True
 
-    def add_slice(self, part: slice, prim: Ints, t: Doubles) -> None:
+    def add_slice(self, lanes: slice, prim: Ints, t: Doubles) -> None:
         """Block the lanes of a slice that have a hit with 0 < t < distance, (k,)."""
         rounded = t.astype(f4)
-        self.blocked[part] |= (rounded > 0) & (rounded < self.distance[part])
+        self.blocked[lanes] |= (rounded > 0) & (rounded < self.distance[lanes])
 
     def t_far(self) -> Floats:
         """Return the rays' lengths, or -inf where a ray is blocked, as `bvh.trace` takes them, (n + 1,)."""
@@ -122,7 +122,7 @@ class Candidates:
             self.flush()
 
     def flush(self) -> None:
-        """Pass on what has been collected."""
+        """Pass on the collected pairs."""
         if self.count:
             self.test(*(np.concatenate(column) for column in zip(*self.parts, strict=True)))
         self.parts, self.count = [], 0

@@ -70,9 +70,9 @@ class InstanceAccelerator:
             for number, at in self._by_mesh(instance):
                 lanes, some = lane.take(at), instance.take(at)
                 rays = self._local(origin, direction, excluded, lanes, some)
-                found = self._mesh(number, lanes).closest(*rays)
-                found.prim += np.where(found.prim >= 0, self.placements.first.take(some), 0)
-                _update_closest(hits, lanes, found)
+                mesh_hits = self._mesh(number, lanes).closest(*rays)
+                mesh_hits.prim += np.where(mesh_hits.prim >= 0, self.placements.first.take(some), 0)
+                _update_closest(hits, lanes, mesh_hits)
         return hits
 
     def occluded(self, origin: Floats, direction: Floats, distance: Floats, exclude_prim: Ints) -> Bools:
@@ -144,10 +144,10 @@ class InstanceAccelerator:
         parts = [(at, min(at + (1 << LANE_BITS), n)) for at in range(0, n, 1 << LANE_BITS)]
         while parts:
             begin, end = parts.pop()
-            part = slice(begin, end)
-            pairs = self._pairs(origin[:, part], direction[:, part], t_far[part])
+            span = slice(begin, end)
+            pairs = self._pairs(origin[:, span], direction[:, span], t_far[span])
             if pairs is not None:
-                for lane, instance in _nearest_first(pairs, t_far[part], self._instance_bits):
+                for lane, instance in _nearest_first(pairs, t_far[span], self._instance_bits):
                     yield lane + begin, instance
             else:
                 middle = (begin + end) // 2
@@ -178,8 +178,8 @@ class InstanceAccelerator:
         total = 0
         while code.size:
             codes, lanes = [], []
-            for part in spans(code.size, CHUNK // self._width):
-                child, lane_met, near = self._children_met(code[part], lane[part], origin, inverse, t_far)
+            for span in spans(code.size, CHUNK // self._width):
+                child, lane_met, near = self._children_met(code[span], lane[span], origin, inverse, t_far)
                 leaf = np.flatnonzero(child < 0)
                 instance = self._instance.take(-1 - child.take(leaf))
                 packed.append(_pack(lane_met.take(leaf), near.take(leaf), instance, self._instance_bits))
@@ -211,9 +211,9 @@ class InstanceAccelerator:
             met = np.flatnonzero(~(near * (1 - ROUNDING) > far * (1 + ROUNDING)))
         slot, pair = np.divmod(met, node.size)
         child = self._child[node.take(pair), slot]
-        there = np.flatnonzero(child)
-        entry = np.fmax(near.ravel().take(met.take(there)) * (1 - ROUNDING), f4(0)) + f4(0)  # never -0
-        return child.take(there), lane.take(pair.take(there)), entry
+        present = np.flatnonzero(child)
+        entry = np.fmax(near.ravel().take(met.take(present)) * (1 - ROUNDING), f4(0)) + f4(0)  # never -0
+        return child.take(present), lane.take(pair.take(present)), entry
 
 
 def _pack(lane: Ints, near: Floats, instance: Ints, bits: int) -> NDArray[np.int64]:
@@ -258,14 +258,18 @@ def _nearest_first(packed: NDArray[np.int64], t_far: Floats, bits: int) -> Itera
         taken *= 2
 
 
-def _update_closest(hits: Intersections, lane: Ints, found: Intersections) -> None:
-    """Replace hits on lanes (p,), of which some may be equal, by those of `found` that are nearer."""
+def _update_closest(hits: Intersections, lane: Ints, candidates: Intersections) -> None:
+    """Replace hits on lanes (p,), of which some may be equal, by those of `candidates` that are nearer."""
     t, prim = hits.t.take(lane), hits.prim.take(lane)
-    nearer = np.flatnonzero((found.t < t) | ((found.t == t) & (found.prim < prim) & (found.prim >= 0)))
+    nearer = np.flatnonzero(
+        (candidates.t < t) | ((candidates.t == t) & (candidates.prim < prim) & (candidates.prim >= 0))
+    )
     if (lane[1:] <= lane[:-1]).any():  # else each lane occurs once
-        nearer = nearer.take(np.lexsort((found.prim.take(nearer), found.t.take(nearer), lane.take(nearer))))
+        nearer = nearer.take(
+            np.lexsort((candidates.prim.take(nearer), candidates.t.take(nearer), lane.take(nearer)))
+        )
         ordered = lane.take(nearer)
         nearer = nearer.compress(np.append(True, ordered[1:] != ordered[:-1])[: ordered.size])
     lane = lane.take(nearer)
-    hits.t[lane], hits.prim[lane] = found.t.take(nearer), found.prim.take(nearer)
-    hits.b1[lane], hits.b2[lane] = found.b1.take(nearer), found.b2.take(nearer)
+    hits.t[lane], hits.prim[lane] = candidates.t.take(nearer), candidates.prim.take(nearer)
+    hits.b1[lane], hits.b2[lane] = candidates.b1.take(nearer), candidates.b2.take(nearer)

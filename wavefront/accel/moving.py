@@ -55,15 +55,15 @@ class MovingInstances(InstanceAccelerator):
         return InstanceAccelerator.occluded(query, origin, direction, distance, exclude_prim)
 
     def _at(self, exclude_prim: Ints, time: Doubles | None = None) -> Self:
-        """Return what traces rays at times (n,)."""
+        """Return the accelerator for rays at times (n,)."""
         query = copy(self)
         query._time = np.full(exclude_prim.size, self._motions.middle) if time is None else time
         return query
 
     def _mesh(self, number: int, lanes: Ints) -> Accelerator:
         mesh: Any = self._meshes[number]
-        found: Accelerator = mesh.at(self._time.take(lanes)) if self._deforms[number] else mesh
-        return found
+        accelerator: Accelerator = mesh.at(self._time.take(lanes)) if self._deforms[number] else mesh
+        return accelerator
 
     def _matrices(self, lane: Ints, instance: Ints) -> Doubles:
         mover = self._mover.take(instance)

@@ -39,7 +39,10 @@ def _ball_of(geometry: Geometry) -> Ball:
     corners += [geometry.triangles.reshape(-1, 3)] if len(geometry.triangles) else []
     if not corners:
         return Ball(np.zeros(3, f4), 1.0)
-    low, high = np.stack([part.min(0) for part in corners], 1), np.stack([part.max(0) for part in corners], 1)
+    low, high = (
+        np.stack([points.min(0) for points in corners], 1),
+        np.stack([points.max(0) for points in corners], 1),
+    )
     return bounding_ball(low, high)
 
 
@@ -89,15 +92,15 @@ class NumpyAccelerator:
         n = origin.shape[1]
         hits = Intersections(np.empty(n, f4), np.empty(n, np.intp), np.empty(n, f4), np.empty(n, f4))
         for at in range(0, n, self._batch):
-            part = slice(at, at + self._batch)
+            lanes = slice(at, at + self._batch)
             with np.errstate(all="ignore"):
-                batch = prepare(origin[:, part], direction[:, part], exclude_prim[part], self._ball)
-                found = ClosestHit(batch, self._ball)
+                batch = prepare(origin[:, lanes], direction[:, lanes], exclude_prim[lanes], self._ball)
+                accumulator = ClosestHit(batch, self._ball)
                 if self._triangles is not None:
-                    self._triangles.find_hits(batch, found)
+                    self._triangles.find_hits(batch, accumulator)
                 for curved in self._curved:
-                    curved.find_hits(batch, found)
-                self._unpack(batch, found.packed, hits, part)
+                    curved.find_hits(batch, accumulator)
+                self._unpack(batch, accumulator.packed, hits, lanes)
         return hits
 
     def occluded(self, origin: Floats, direction: Floats, distance: Floats, exclude_prim: Ints) -> Bools:
@@ -105,26 +108,26 @@ class NumpyAccelerator:
         n = origin.shape[1]
         blocked = np.zeros(n, bool)
         for at in range(0, n, self._batch):
-            part = slice(at, at + self._batch)
-            rays = origin[:, part], direction[:, part], exclude_prim[part]
+            lanes = slice(at, at + self._batch)
+            rays = origin[:, lanes], direction[:, lanes], exclude_prim[lanes]
             with np.errstate(all="ignore"):
-                batch = prepare(*rays, self._ball, distance[part])
-                found = AnyHit(batch, self._ball, distance[part])
+                batch = prepare(*rays, self._ball, distance[lanes])
+                accumulator = AnyHit(batch, self._ball, distance[lanes])
                 if self._triangles is not None:
-                    self._triangles.find_blocked(batch, found)
+                    self._triangles.find_blocked(batch, accumulator)
                 for curved in self._curved:
-                    curved.find_hits(batch, found)
-            blocked[part] = found.blocked
+                    curved.find_hits(batch, accumulator)
+            blocked[lanes] = accumulator.blocked
         return blocked
 
-    def _unpack(self, batch: RayBatch, packed: Codes, hits: Intersections, part: slice) -> None:
-        """Write packed hits (n,), and barycentrics of triangles, to the slice `part` of `hits`."""
-        hits.t[part] = t = unpack_t(packed)
+    def _unpack(self, batch: RayBatch, packed: Codes, hits: Intersections, lanes: slice) -> None:
+        """Write packed hits (n,), and barycentrics of triangles, to the slice `lanes` of `hits`."""
+        hits.t[lanes] = t = unpack_t(packed)
         prim = unpack_prim(packed)
         if self._triangles is not None:
             prim = self._triangles.resolve_quads(prim, batch, t)
-        hits.prim[part] = prim
-        b1, b2 = hits.b1[part], hits.b2[part]
+        hits.prim[lanes] = prim
+        b1, b2 = hits.b1[lanes], hits.b2[lanes]
         b1[...] = 0
         b2[...] = 0
         if not self._weights or self._triangles is None:

@@ -127,14 +127,14 @@ class PlateAccelerator:
         n, near = origin.shape[1], self._near(origin, direction)
         hits = Intersections(np.full(n, np.inf, f4), np.full(n, -1), np.zeros(n, f4), np.zeros(n, f4))
         if near.size:
-            found = self.rest.closest(
+            rest_hits = self.rest.closest(
                 take(origin, near), take(direction, near), self._left(exclude_prim, near)
             )
             hits.t[near], hits.prim[near], hits.b1[near], hits.b2[near] = (
-                found.t,
-                found.prim,
-                found.b1,
-                found.b2,
+                rest_hits.t,
+                rest_hits.prim,
+                rest_hits.b1,
+                rest_hits.b2,
             )
         return hits
 
@@ -217,7 +217,7 @@ def surely_occluded(
 ) -> tuple[Bools, Bools]:
     """Return which rays (3, n) hit something opaque, (n,), and which others may be blocked, (n,).
 
-    Accelerators that do not know what is opaque leave all of those that hit anything.
+    Accelerators that do not know opaque primitives leave all rays that hit anything.
     """
     rays: tuple[Any, ...] = (origin, direction, distance, exclude_prim, *moment)
     ask = getattr(accelerator, "surely_occluded", None)

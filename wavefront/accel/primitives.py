@@ -27,7 +27,7 @@ class PrimitiveTests(Protocol):
         """Test pairs that the filter has not ruled out: primitives (k,), lanes (k,), and its values (k,)."""
 
     def finish(self) -> None:
-        """Test what is left."""
+        """Test the remaining candidates."""
 
 
 class Primitives(SoA, ABC):
@@ -66,8 +66,8 @@ class Primitives(SoA, ABC):
         return products[:, 0]
 
     @abstractmethod
-    def tests(self, batch: RayBatch, found: HitAccumulator, first: int) -> PrimitiveTests:
-        """Return the exact tests of a batch; hits are added to `found`, with ids from `first` on."""
+    def tests(self, batch: RayBatch, accumulator: HitAccumulator, first: int) -> PrimitiveTests:
+        """Return the exact tests of a batch; hits are added to `accumulator`, with ids from `first` on."""
 
 
 class CurvedPrimitives(Primitives):
@@ -114,18 +114,18 @@ class CurvedPrimitives(Primitives):
     def dpduv(self, prim: Ints, point: Floats) -> Floats:
         """Return the derivatives of the point by `uv`, (6, n); 0 where there are none."""
 
-    def tests(self, batch: RayBatch, found: HitAccumulator, first: int) -> CurvedTests:
+    def tests(self, batch: RayBatch, accumulator: HitAccumulator, first: int) -> CurvedTests:
         """Return tests by `distance`."""
-        return CurvedTests(self, batch, found, first)
+        return CurvedTests(self, batch, accumulator, first)
 
 
 class CurvedTests:
     """Tests of one batch of rays by the `distance` of their primitives."""
 
     def __init__(
-        self, primitives: CurvedPrimitives, batch: RayBatch, found: HitAccumulator, first: int
+        self, primitives: CurvedPrimitives, batch: RayBatch, accumulator: HitAccumulator, first: int
     ) -> None:
-        self.primitives, self.batch, self.found, self.first = primitives, batch, found, first
+        self.primitives, self.batch, self.accumulator, self.first = primitives, batch, accumulator, first
 
     def add(self, prim: Ints, lane: Ints, value: Floats) -> None:
         """Test primitives (k,) and lanes (k,)."""
@@ -133,7 +133,7 @@ class CurvedTests:
         direction = self.batch.direction.take(lane, 1).astype(np.float64)
         ids = prim + self.first
         leaves = self.batch.exclude_prim.take(lane) == ids
-        self.found.add(lane, ids, self.primitives.distance(prim, origin, direction, leaves))
+        self.accumulator.add(lane, ids, self.primitives.distance(prim, origin, direction, leaves))
 
     def finish(self) -> None:
         """Everything has been tested."""

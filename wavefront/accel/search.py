@@ -27,12 +27,12 @@ class PrimitiveList:
         rows = primitives.filter_rows(ball)
         self._rows = rows.reshape(-1, rows.shape[-1])
 
-    def find_hits(self, batch: RayBatch, found: HitAccumulator) -> None:
-        """Add all hits to `found`."""
+    def find_hits(self, batch: RayBatch, accumulator: HitAccumulator) -> None:
+        """Add all hits to `accumulator`."""
         count = len(self._primitives)
         if not count:
             return
-        tests = self._primitives.tests(batch, found, self._first)
+        tests = self._primitives.tests(batch, accumulator, self._first)
         features = self._primitives.features(batch.line[:, :-1], self._ball)
         n = batch.count
         step = max(64, CHUNK // len(self._rows))
@@ -57,34 +57,34 @@ class PrimitiveTree:
 
     def of(self, primitives: Primitives) -> Self:
         """Return the same tree over primitives in other states, which it bounds, too."""
-        found = copy(self)
-        found._primitives = primitives
-        return found
+        rebound = copy(self)
+        rebound._primitives = primitives
+        return rebound
 
     def _leaf_matrices(self, leaf_size: int) -> Floats:
         """Return the rows of the filter, (leaves, rows * leaf_size, columns); NaN where a leaf has none."""
         empty = (self.tree.prim < 0).reshape(-1, leaf_size)
         leaves = np.empty((0, 0, 0), f4)
-        for part in spans(len(empty), max(1, AT_ONCE // leaf_size)):
-            slots = self._slots.reshape(-1, leaf_size)[part]
+        for span in spans(len(empty), max(1, AT_ONCE // leaf_size)):
+            slots = self._slots.reshape(-1, leaf_size)[span]
             rows = self._primitives.take(slots.reshape(-1)).filter_rows(self._ball)
             rows = rows.reshape(len(rows), *slots.shape, -1)  # (rows, leaves, leaf_size, columns)
-            rows[:, empty[part]] = np.nan
+            rows[:, empty[span]] = np.nan
             if not leaves.size:
                 leaves = np.empty((len(empty), len(rows) * leaf_size, rows.shape[3]), f4)
-            leaves[part] = rows.transpose(1, 0, 2, 3).reshape(slots.shape[0], -1, rows.shape[3])
+            leaves[span] = rows.transpose(1, 0, 2, 3).reshape(slots.shape[0], -1, rows.shape[3])
         return leaves
 
-    def find_hits(self, batch: RayBatch, found: HitAccumulator) -> None:
-        """Add all hits to `found`."""
-        tests = self._primitives.tests(batch, found, self._first)
+    def find_hits(self, batch: RayBatch, accumulator: HitAccumulator) -> None:
+        """Add all hits to `accumulator`."""
+        tests = self._primitives.tests(batch, accumulator, self._first)
         features = self._primitives.features(batch.line, self._ball)
-        trace(self.tree, batch, found.t_far, partial(self._visit, batch.count, features, tests))
+        trace(self.tree, batch, accumulator.t_far, partial(self._visit, batch.count, features, tests))
         tests.finish()
 
-    def find_blocked(self, batch: RayBatch, found: AnyHit) -> None:
-        """Mark the blocked lanes in `found`."""
-        self.find_hits(batch, found)
+    def find_blocked(self, batch: RayBatch, accumulator: AnyHit) -> None:
+        """Mark the blocked lanes in `accumulator`."""
+        self.find_hits(batch, accumulator)
 
     def resolve_quads(self, prim: Ints, batch: RayBatch, t: Floats) -> Ints:
         """Return the primitives (n,) unchanged: the tree tests no quadrilaterals."""

@@ -1,4 +1,4 @@
-"""Primitives around straight segments: what cylinders and capsules share.
+"""Primitives around straight segments: the common base of cylinders and capsules.
 
 Lines are cut in the plane perpendicular to the axis, where a cylinder is a circle, with the discriminant from
 the distance between line and axis as for spheres (Haines et al., "Precision improvements for ray/sphere

@@ -38,8 +38,8 @@ class SpherePrimitives(CurvedPrimitives):
         radii = np.concatenate([np.broadcast_to(shape.radii, shape.count) for shape in shapes])
         turns = None
         if any(getattr(shape, "transform", None) is not None for shape in shapes):
-            given = [getattr(shape, "transform", None) for shape in shapes]
-            rows = [np.eye(3) if turn is None else turn for turn in given]
+            transforms = [getattr(shape, "transform", None) for shape in shapes]
+            rows = [np.eye(3) if turn is None else turn for turn in transforms]
             counts = [shape.count for shape in shapes]
             turns = np.repeat([row.T.ravel() for row in rows], counts, 0).T.astype(f4)
         return cls(np.ascontiguousarray(centers.T, f4), radii.astype(f4), turns)
@@ -81,11 +81,11 @@ class SpherePrimitives(CurvedPrimitives):
 
     def dpduv(self, prim: Ints, point: Floats) -> Floats:
         """Return the derivatives of the point by longitude and latitude, (6, n)."""
-        found = sphere_dpduv(self._own(prim, point), self.radii.take(prim))
+        derivatives = sphere_dpduv(self._own(prim, point), self.radii.take(prim))
         if self.turns is None:
-            return found
+            return derivatives
         x, y, z = self.turns.take(prim, 1).reshape(3, 3, -1)
-        turned = [x * v[0] + y * v[1] + z * v[2] for v in (found[:3], found[3:])]
+        turned = [x * v[0] + y * v[1] + z * v[2] for v in (derivatives[:3], derivatives[3:])]
         return np.concatenate(turned)
 
     def _own(self, prim: Ints, point: Floats) -> Floats:
@@ -111,9 +111,10 @@ def sphere_rows(centers: Doubles, radii: Doubles, center: Floats, radius: float)
     c = centers - np.asarray(center, np.float64)[:, None]
     x, y, z = c
     size2 = x * x + y * y + z * z
-    one = np.ones_like(radii)
+    ones = np.ones_like(radii)
     rows = np.stack(
-        [radii**2 - size2, -one, 2 * x, 2 * y, 2 * z, x * x, y * y, z * z, 2 * x * y, 2 * x * z, 2 * y * z], 1
+        [radii**2 - size2, -ones, 2 * x, 2 * y, 2 * z, x * x, y * y, z * z, 2 * x * y, 2 * x * z, 2 * y * z],
+        1,
     )
     error = 150 * ROUNDOFF * radius * radius
     return (rows / error).astype(f4)

@@ -41,18 +41,18 @@ def triangle_table(triangles: Floats, weights: bool) -> TriangleTable:
     m = len(triangles)
     plane = np.empty((4, m))
     second, third = (np.empty((4, m)) if weights else None for _ in range(2))
-    for part in spans(m, AT_ONCE):
-        a, b, c = vertices(triangles[part])
+    for span in spans(m, AT_ONCE):
+        a, b, c = vertices(triangles[span])
         normal = cross(b - a, c - a)
-        _write_plane(plane[:, part], normal, a)
+        _write_plane(plane[:, span], normal, a)
         if second is None or third is None:
             continue
         with np.errstate(all="ignore"):
             size2 = (normal * normal).sum(0)
             gradients = cross(c - a, normal) / size2, cross(normal, b - a) / size2
         for rows, gradient in zip((second, third), gradients, strict=True):
-            _write_plane(rows[:, part], gradient, a)
-            rows[3, part] *= -1
+            _write_plane(rows[:, span], gradient, a)
+            rows[3, span] *= -1
     return TriangleTable(triangles, plane, second, third)
 
 
@@ -69,14 +69,14 @@ def vertices(triangles: Floats) -> Doubles:
 
 def has_area(triangles: Floats) -> Bools:
     """Return a mask of the triangles (m, 3, 3) that are not degenerate; a degenerate one is never hit."""
-    found = np.empty(len(triangles), np.bool_)
-    for part in spans(found.size, AT_ONCE):
-        a, b, c = vertices(triangles[part])
+    mask = np.empty(len(triangles), np.bool_)
+    for span in spans(mask.size, AT_ONCE):
+        a, b, c = vertices(triangles[span])
         normal = cross(b - a, c - a)
         with np.errstate(all="ignore"):
             size2 = (normal * normal).sum(0)
-        found[part] = (size2 > 0) & np.isfinite(size2)
-    return found
+        mask[span] = (size2 > 0) & np.isfinite(size2)
+    return mask
 
 
 def edge_rows(corners: Floats, center: Floats, radius: float) -> Floats:

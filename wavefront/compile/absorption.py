@@ -28,14 +28,14 @@ from ..shapes import Cylinders, Instance, Mesh, Shape, Sphere
 from ..shapes.instance import instance_bounds
 from .geometry import boxes_of_groups
 
-NEAR = 1e-6  # what counts as touching, relative to the size of a box
+NEAR = 1e-6  # largest gap of boxes that touch, relative to their size
 MOST_PARTS = 1 << 11  # of absorbers, beyond which the table is taken without a search
 MOST_FACES = 1 << 22  # of other shapes that are searched; likewise
 
 
 @soa
 class Boxes:
-    """Boxes of absorbers: what touches them counts on flat sides alone."""
+    """Boxes of absorbers; only flat sides can touch."""
 
     low: Doubles  # (k, 3)
     high: Doubles  # (k, 3)
@@ -76,14 +76,14 @@ def _boxes(shapes: Sequence[Shape], absorbers: Sequence[int]) -> Boxes | None:
     """Return the boxes of the parts of absorbers; None if one is open, inside out or within another."""
     parts: list[tuple[Doubles, Doubles]] = []
     for number in absorbers:
-        found = _parts(shapes[number])
-        if found is None or len(found[0]) > MOST_PARTS or len(parts) > MOST_PARTS:
+        bounds = _parts(shapes[number])
+        if bounds is None or len(bounds[0]) > MOST_PARTS or len(parts) > MOST_PARTS:
             return None
-        parts.append(found)
-    low, high = (np.concatenate([each[side] for each in parts]) for side in (0, 1))
+        parts.append(bounds)
+    low, high = (np.concatenate([pair[side] for pair in parts]) for side in (0, 1))
     if len(low) > MOST_PARTS:
         return None
-    boxes = Boxes(low, high, np.repeat(absorbers, [len(each[0]) for each in parts]))
+    boxes = Boxes(low, high, np.repeat(absorbers, [len(pair[0]) for pair in parts]))
     meets = boxes.meet(boxes.low, boxes.high)
     np.fill_diagonal(meets, False)
     return None if meets.any() else boxes
@@ -112,14 +112,14 @@ def _parts_of_mesh(vertices: Doubles, faces: Ints) -> tuple[Doubles, Doubles] | 
     points, number = np.unique(vertices.take(faces.ravel(), 0) + 0.0, axis=0, return_inverse=True)
     a, b, c = number.reshape(-1, 3).T
     solid = (a != b) & (b != c) & (c != a)
-    a, b, c = (each.compress(solid) for each in (a, b, c))
+    a, b, c = (corner.compress(solid) for corner in (a, b, c))
     start, end = np.concatenate([a, b, c]), np.concatenate([b, c, a])
     count = len(points)
     edges = np.sort(start * count + end)
     if (edges[1:] == edges[:-1]).any() or not np.array_equal(edges, np.sort(end * count + start)):
         return None
     used, part_of = np.unique(connected_parts(count, start, end).take(a), return_inverse=True)
-    corners = np.stack([points.take(each, 0) for each in (a, b, c)], 1)
+    corners = np.stack([points.take(corner, 0) for corner in (a, b, c)], 1)
     if not used.size or (_volumes(corners, part_of, used.size) <= 0).any():
         return None
     return _boxes_of_parts(corners, part_of, used.size)

@@ -19,11 +19,11 @@ GOLDEN = (5**0.5 - 1) / 2  # of a turn, between two directions
 def brightest_emitter(scene: CompiledScene) -> Doubles:
     """Return the greatest radiance of all that rays can meet, (3,) each channel; 0 where they meet no light.
 
-    An environment is looked up in directions that it samples, so that what has a thousandth of its light is
-    not missed, and in directions all around.
+    An environment is looked up in directions that it samples, so that a part with a thousandth of its light
+    is not missed, and in directions all around.
     """
-    found = [np.zeros(3), *(_brightest(kind) for kind in scene.lights.kinds if not kind.delta)]
-    return np.max(found, axis=0)
+    radiances = [np.zeros(3), *(_brightest(kind) for kind in scene.lights.kinds if not kind.delta)]
+    return np.max(radiances, axis=0)
 
 
 def _brightest(kind: LightRecord) -> Doubles:
@@ -34,8 +34,8 @@ def _brightest(kind: LightRecord) -> Doubles:
     if isinstance(kind, GlowLights):  # its mean emission, along its extent
         return np.full(3, kind.cells.power / (4 * np.pi * max(kind.cells.extent, 1e-30) ** 2))
     emissions = getattr(kind, "emissions", ())
-    known = [getattr(kind, "radiance", None), *(_constant(each) for each in emissions)]
-    values = [_most(each) for each in known if each is not None]
+    known = [getattr(kind, "radiance", None), *(_constant(emission) for emission in emissions)]
+    values = [_most(radiance) for radiance in known if radiance is not None]
     return np.max(values, axis=0) if values else _sampled(kind)
 
 

@@ -60,9 +60,9 @@ class CurvedTable:
         if len(self.kinds) == 1:
             return self.kinds[0].surface(prim, point, error)
         normal = np.empty_like(point)
-        for kind, lanes, own in self._by_kind(prim):
+        for kind, lanes, number in self._by_kind(prim):
             some, bound = take(point, lanes), take(error, lanes)
-            put(normal, lanes, kind.surface(own, some, bound))
+            put(normal, lanes, kind.surface(number, some, bound))
             put(point, lanes, some)
             error[lanes] = bound
         return normal
@@ -75,22 +75,22 @@ class CurvedTable:
     def shading(self, prim: Ints, point: Floats, normal: Floats) -> Floats:
         """Return shading normals (3, n), given those of the surface (3, n)."""
         values = np.empty_like(normal)
-        for kind, lanes, own in self._by_kind(prim):
-            values[:, lanes] = kind.shading(own, take(point, lanes), take(normal, lanes))
+        for kind, lanes, number in self._by_kind(prim):
+            values[:, lanes] = kind.shading(number, take(point, lanes), take(normal, lanes))
         return values
 
     def uv(self, prim: Ints, point: Floats) -> Floats:
         """Return texture coordinates, (2, n)."""
         values = np.empty((2, prim.size), f4)
-        for kind, lanes, own in self._by_kind(prim):
-            values[:, lanes] = kind.uv(own, take(point, lanes))
+        for kind, lanes, number in self._by_kind(prim):
+            values[:, lanes] = kind.uv(number, take(point, lanes))
         return values
 
     def dpduv(self, prim: Ints, point: Floats) -> Floats:
         """Return the derivatives of the point by `uv`, (6, n)."""
         values = np.empty((6, prim.size), f4)
-        for kind, lanes, own in self._by_kind(prim):
-            values[:, lanes] = kind.dpduv(own, take(point, lanes))
+        for kind, lanes, number in self._by_kind(prim):
+            values[:, lanes] = kind.dpduv(number, take(point, lanes))
         return values
 
     def color(self, prim: Ints, point: Floats) -> Floats:

@@ -36,8 +36,8 @@ def gather_triangles(meshes: Sequence[Mesh], vertices: Sequence[Doubles]) -> tup
     triangles, normals = np.empty((count, 3, 3), f4), np.empty((3, count), f4)
     end = 0
     for mesh, points in zip(meshes, vertices, strict=True):
-        for part in spans(len(mesh.faces), AT_ONCE):
-            corners = points.take(mesh.faces[part], 0)
+        for span in spans(len(mesh.faces), AT_ONCE):
+            corners = points.take(mesh.faces[span], 0)
             start, end = end, end + len(corners)
             triangles[start:end] = corners
             normals[:, start:end] = compute_face_normals(corners)
@@ -64,10 +64,10 @@ def compute_corner_normals(meshes: Sequence[Mesh], normals: Floats) -> tuple[Flo
     for mesh in meshes:
         end = start + len(mesh.faces)
         if mesh.normals is not None:
-            given = np.ascontiguousarray(mesh.normals.T)
-            size = length(given)
-            given = (given / np.where(size > 0, size, 1)).astype(f4)
+            vertex_normals = np.ascontiguousarray(mesh.normals.T)
+            size = length(vertex_normals)
+            vertex_normals = (vertex_normals / np.where(size > 0, size, 1)).astype(f4)
             for corner, vertex in zip(corners, mesh.faces.T, strict=True):
-                np.copyto(corner[:, start:end], given.take(vertex, 1), where=size.take(vertex) > 0)
+                np.copyto(corner[:, start:end], vertex_normals.take(vertex, 1), where=size.take(vertex) > 0)
         start = end
     return corners

@@ -71,7 +71,7 @@ def sort_shapes(
     plane.
     """
     still = [shape for number, shape in enumerate(shapes) if number not in moving] if moving else shapes
-    kept = _kept_instances(still, most_copies)
+    shared = _kept_instances(still, most_copies)
     meshes: list[Mesh] = []
     curved: list[CurvedShape] = []
     instances: list[Instance] = []
@@ -85,7 +85,7 @@ def sort_shapes(
             numbers[1].append(number)
         elif not isinstance(shape, Instance):
             raise SceneError(f"{shape.name}: cannot trace a {type(shape).__name__}")
-        elif id(shape) in kept or number in moving:
+        elif id(shape) in shared or number in moving:
             instances.append(shape)
             numbers[2].append(number)
         else:
@@ -103,11 +103,13 @@ def _kept_instances(shapes: Sequence[Shape], most_copies: int) -> set[int]:
         return set()
     copies = Counter(id(instance.mesh) for instance in instances)
     shareable = _shareable(instances)
-    kept = [each for each in instances if copies[id(each.mesh)] > 1 and id(each) in shareable]
-    left = {id(each) for each in kept}
-    meshes = [each.to_mesh() for each in instances if id(each) not in left]
+    candidates = [
+        instance for instance in instances if copies[id(instance.mesh)] > 1 and id(instance) in shareable
+    ]
+    left = {id(instance) for instance in candidates}
+    meshes = [instance.to_mesh() for instance in instances if id(instance) not in left]
     meshes += [shape for shape in shapes if isinstance(shape, Mesh)]
-    return left - overlapping_instances(kept, meshes)
+    return left - overlapping_instances(candidates, meshes)
 
 
 def _shareable(instances: Sequence[Instance]) -> set[int]:

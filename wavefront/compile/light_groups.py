@@ -18,11 +18,11 @@ from ..shapes import CurvedShape, Mesh
 
 PATCHED = -2  # the group of an environment whose patches are groups
 
-K = TypeVar("K", bound=Hashable)  # what groups are known by
+K = TypeVar("K", bound=Hashable)  # key of a group: its number, or its name
 
 
 class LightKey(NamedTuple):
-    """What lights are told apart by."""
+    """The key by which lights are put into groups."""
 
     group: str
     efficacy: float  # lm/W
@@ -37,7 +37,7 @@ class LightGroups(Generic[K]):
 
     names: tuple[K, ...]
     of_light: Ints  # (lights,) number of the group; -1 of an environment of several groups, PATCHED
-    environment: tuple[tuple[K, InfiniteLight], ...]  # the groups of the environment, and what they send
+    environment: tuple[tuple[K, InfiniteLight], ...]  # the groups of the environment, and their lights
     patches: SkyPatches | None = None  # of an environment each of whose patches is a group, the first ones
 
     @property
@@ -67,7 +67,7 @@ def primitive_count(shape: Mesh | CurvedShape) -> int:
 
 
 class GroupNumbers:
-    """Numbers what the lights of a scene are told apart by, while its table of lights is built."""
+    """Numbers the groups of the lights of a scene, while its table of lights is built."""
 
     def __init__(self) -> None:
         self._numbers: dict[LightKey, int] = {}
@@ -111,12 +111,12 @@ class GroupNumbers:
 
     def groups(self) -> LightGroups[str]:
         """Return the groups by their names; the environment is the last light."""
-        found = self._by(lambda key: key.group)
-        if len(found.environment) != 1 or not isinstance(found.environment[0][1], PatchedEnvironment):
-            return found
-        patched = found.environment[0][1]
-        of_light = np.append(found.of_light[:-1] + len(patched.names), PATCHED)
-        return LightGroups((*patched.names, *found.names), of_light, (), patched.patches)
+        by_name = self._by(lambda key: key.group)
+        if len(by_name.environment) != 1 or not isinstance(by_name.environment[0][1], PatchedEnvironment):
+            return by_name
+        patched = by_name.environment[0][1]
+        of_light = np.append(by_name.of_light[:-1] + len(patched.names), PATCHED)
+        return LightGroups((*patched.names, *by_name.names), of_light, (), patched.patches)
 
     def efficacies(self) -> LightGroups[float]:
         """Return the lights by their efficacy, lm/W; the environment is the last light."""

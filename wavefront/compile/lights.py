@@ -40,11 +40,11 @@ from .motion import MotionTable
 from .moving_lights import moving_light, moving_parts
 
 # A record, and the primitives of its lights: (..., k) a column per light, or (..., m) of one light, or none.
-Part: TypeAlias = tuple[LightRecord, Ints | None]
+Emitter: TypeAlias = tuple[LightRecord, Ints | None]
 
 
 def find_backdrop(scene: Scene, scale: float, center: Doubles) -> InfiniteLight | None:
-    """Return what the camera sees of lights at infinity, None if it sees these themselves."""
+    """Return the light at infinity that the camera sees; None if it is the one that lights the scene."""
     shown = [light.backdrop or light if isinstance(light, Environment) else light for light in scene.lights]
     if shown == list(scene.lights):
         return None
@@ -67,7 +67,7 @@ def gather_lights(
     motion: MotionTable | None = None,
     light_motions: tuple[Motions | None, Mapping[int, int]] = (None, {}),
 ) -> tuple[LightTable, GroupNumbers, Ints, int]:
-    """Return the lights, what tells them apart, and the light of each primitive and of rays that miss.
+    """Return the lights, their groups, and the light of each primitive and of rays that miss.
 
     Parameters
     ----------
@@ -95,20 +95,20 @@ def gather_lights(
     """
     traced: list[Mesh | CurvedShape] = [*meshes, *curved]
     first_row, primitives = _first_rows(traced)
-    parts: list[Part] = [
+    emitters: list[Emitter] = [
         *_area_lights(meshes, vertices, motion),
         *_sphere_lights(curved, first_row, center),
     ]
     if motion is not None:
-        parts = [each for part in parts for each in moving_parts(*part, motion)]
+        emitters = [moved for emitter in emitters for moved in moving_parts(*emitter, motion)]
     groups = GroupNumbers()
     of_row = groups.of_shapes(traced)
-    for _, rows in parts:
+    for _, rows in emitters:
         assert rows is not None
         groups.add(of_row[np.atleast_2d(rows)[0]])
     kinds_of_light: dict[object, list[tuple[LightRecord, int]]] = {}
     infinite: list[InfiniteLight] = []
-    surfaces: list[tuple[Part, int]] = []
+    surfaces: list[tuple[Emitter, int]] = []
     for number, light in enumerate(scene.lights):
         record = _checked_record(light, scale, center)
         if number in light_motions[1]:
@@ -117,23 +117,23 @@ def gather_lights(
             infinite.append(record.compensated() if mis else record)
             groups.add_to_environment(light, infinite[-1])
         elif light.shape is not None:
-            part: Part = record, _rows_of(light, record, scene.shapes, scaled, first_row)
-            surfaces.append((part, groups.number(light)))
+            emitter: Emitter = record, _rows_of(light, record, scene.shapes, scaled, first_row)
+            surfaces.append((emitter, groups.number(light)))
         else:
             key = type(record), *map(id, record.shared())
             kinds_of_light.setdefault(key, []).append((record, groups.number(light)))
     for of_kind in kinds_of_light.values():
         records, numbers = zip(*of_kind, strict=True)
-        parts.append((type(records[0]).concatenate(records), None))
+        emitters.append((type(records[0]).concatenate(records), None))
         groups.add(np.repeat(numbers, [len(record) for record in records]))
-    for part, number in surfaces:
-        parts.append(part)
-        groups.add(np.full(len(part[0]), number))
+    for emitter, number in surfaces:
+        emitters.append(emitter)
+        groups.add(np.full(len(emitter[0]), number))
     for record in glowing:
-        parts.append((record, None))
+        emitters.append((record, None))
         groups.add(np.array([groups.default()]))
-    light_of, count = _lights_of_primitives(parts, primitives)
-    kinds = [record for record, _ in parts]
+    light_of, count = _lights_of_primitives(emitters, primitives)
+    kinds = [record for record, _ in emitters]
     if infinite:
         kinds.append(EnvironmentSum.of(infinite))
     return LightTable(kinds, half_size, choice), groups, light_of, count if infinite else -1
@@ -161,10 +161,10 @@ def _checked_record(light: Light, scale: float, center: Doubles) -> LightRecord:
     return record
 
 
-def _lights_of_primitives(parts: Sequence[Part], primitives: int) -> tuple[Ints, int]:
+def _lights_of_primitives(emitters: Sequence[Emitter], primitives: int) -> tuple[Ints, int]:
     """Return the light (primitives,) of each primitive, -1 for none, and the number of lights."""
     light_of, count = np.full(primitives, -1, np.intp), 0
-    for record, rows in parts:
+    for record, rows in emitters:
         if rows is not None:
             if (light_of[rows] >= 0).any():
                 raise SceneError(f"{type(record).__name__}: its shape is a light already")
@@ -183,7 +183,7 @@ def _rows_of(
     """Return the primitives (m,) of the shape of a light."""
     name, shape = type(light).__name__, light.shape
     assert shape is not None
-    same = [traced for given, traced in zip(shapes, scaled, strict=True) if given is shape]
+    same = [traced for original, traced in zip(shapes, scaled, strict=True) if original is shape]
     if not same:
         raise SceneError(f"{name}: its shape {shape.name!r} is not in the scene; add it to the shapes")
     if id(same[0]) not in first_row:
@@ -200,7 +200,9 @@ def _rows_of(
     return first_row[id(same[0])] + np.arange(faces)
 
 
-def _sphere_lights(curved: Sequence[CurvedShape], first_row: dict[int, int], center: Doubles) -> list[Part]:
+def _sphere_lights(
+    curved: Sequence[CurvedShape], first_row: dict[int, int], center: Doubles
+) -> list[Emitter]:
     """Return the lights of emitting spheres, if there are any."""
     emitting = [shape for shape in curved if shape.emission is not None]
     for shape in emitting:
@@ -239,7 +241,7 @@ def _lights_of_spheres(shape: Any, center: Doubles) -> SphereLights:
 
 def _area_lights(
     meshes: Sequence[Mesh], vertices: Sequence[Doubles], motion: MotionTable | None
-) -> list[Part]:
+) -> list[Emitter]:
     """Return the emitting rectangles and triangles of all meshes, a record for each kind.
 
     Only uniform emission is taken for rectangles, as their points have no barycentric weights.
@@ -259,29 +261,29 @@ def _area_lights(
     source = source_of[mesh_of]
     shining = _with_area(meshes, mesh_of, triangles)
     even = shining[source[shining] < 0]
-    if motion is not None:  # what deforms is made of triangles
+    if motion is not None:  # meshes that deform are made of triangles
         even = even[motion.is_rigid(face[even])]
     first = first_of_pairs(triangles[even], mesh_of[even])
     pairs = even[np.stack([first, first + 1])]
     alone = shining[~np.isin(shining, pairs)]
     two_sided = np.array([mesh.two_sided for mesh in meshes])[mesh_of]
-    found: list[Part] = []
+    emitters: list[Emitter] = []
     for rectangles, side in ((RectangleLights, ~two_sided), (TwoSidedRectangleLights, two_sided)):
         pair = pairs[:, side[pairs[0]]]
         if pair.size:
-            found.append((rectangles.from_pairs(triangles[pair[0]], radiance[:, pair[0]]), face[pair]))
+            emitters.append((rectangles.from_pairs(triangles[pair[0]], radiance[:, pair[0]]), face[pair]))
     for plain, textured, side in (
         (TriangleLights, TexturedTriangleLights, ~two_sided),
         (TwoSidedTriangleLights, TwoSidedTexturedTriangleLights, two_sided),
     ):
         single = alone[side[alone]]
-        given = triangles[single], radiance[:, single]
+        columns = triangles[single], radiance[:, single]
         if (source[single] >= 0).any():
             prim = np.where(source[single] >= 0, face[single], -1)
-            found.append((textured.textured(*given, prim, source[single], emissions), face[single]))
+            emitters.append((textured.textured(*columns, prim, source[single], emissions), face[single]))
         elif single.size:
-            found.append((plain.from_triangles(*given), face[single]))
-    return found
+            emitters.append((plain.from_triangles(*columns), face[single]))
+    return emitters
 
 
 def _textured_emissions(meshes: Sequence[Mesh]) -> tuple[tuple[Floats | BaseTexture, ...], Ints]:
@@ -295,13 +297,13 @@ def _textured_emissions(meshes: Sequence[Mesh]) -> tuple[tuple[Floats | BaseText
 
 
 def _distinct_emissions(
-    given: Sequence[Floats | BaseTexture | None],
+    shape_emissions: Sequence[Floats | BaseTexture | None],
 ) -> tuple[tuple[Floats | BaseTexture, ...], Ints]:
     """Return emissions, each once, and the number of that of each shape, -1 for None."""
     numbers: dict[int, int] = {}
     emissions: list[Floats | BaseTexture] = []
-    of_shape = np.full(len(given), -1, np.intp)
-    for shape, emission in enumerate(given):
+    of_shape = np.full(len(shape_emissions), -1, np.intp)
+    for shape, emission in enumerate(shape_emissions):
         if emission is None:
             continue
         if id(emission) not in numbers:

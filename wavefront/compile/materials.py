@@ -52,12 +52,12 @@ class Opacities:
 
     def at(self, surface: SurfaceInteraction) -> Floats:
         """Return the opacities at hit points, (n,), in [0, 1]."""
-        found = self.constant.take(surface.material)
+        alpha = self.constant.take(surface.material)
         for material, opacity in self.varying:
             lanes = np.flatnonzero(surface.material == material)
             if lanes.size:
-                found[lanes] = opacity.at(surface.take(lanes))
-        return found
+                alpha[lanes] = opacity.at(surface.take(lanes))
+        return alpha
 
 
 def group_materials(materials: Sequence[Material]) -> MaterialTable:
@@ -111,17 +111,17 @@ def find_alpha(
 ) -> Bools:
     """Return a mask of the primitives (m + k + 1,) with an opacity below 1; a miss, at the end, has none."""
     has_alpha = np.array([material.opacity is not None for material in materials], np.bool_)
-    found = np.append(has_alpha.take(material_of), False)
+    mask = np.append(has_alpha.take(material_of), False)
     placed = {id(shape.mesh) for shape in instances if shape.material.opacity is not None}
     start = 0
     for mesh in meshes:
         end = start + len(mesh.faces)
         opacity = mesh.material.opacity
-        if opacity is not None and mesh.uvs is not None and found[start:end].any():
-            found[start:end] &= ~opacity.is_one_over(mesh.uvs.take(mesh.faces, 0))
-        found[start:end] |= id(mesh) in placed
+        if opacity is not None and mesh.uvs is not None and mask[start:end].any():
+            mask[start:end] &= ~opacity.is_one_over(mesh.uvs.take(mesh.faces, 0))
+        mask[start:end] |= id(mesh) in placed
         start = end
-    return found
+    return mask
 
 
 def find_nonscattering_lights(
@@ -129,9 +129,9 @@ def find_nonscattering_lights(
 ) -> Bools | None:
     """Return a mask of the lights (lights,) whose surface has a black BSDF; None when none has."""
     black = np.array([material.bsdf.black for material in materials], np.bool_).take(material_of)
-    found = np.zeros(lights, np.bool_)
-    found[light_of.compress(black & (light_of >= 0))] = True
-    return found if found.any() else None
+    nonscattering = np.zeros(lights, np.bool_)
+    nonscattering[light_of.compress(black & (light_of >= 0))] = True
+    return nonscattering if nonscattering.any() else None
 
 
 def _is_constant(value: object) -> bool:
@@ -193,12 +193,12 @@ def attributes_read(shapes: Sequence[Shape]) -> list[str]:
             if isinstance(mesh, Mesh) and ATTRIBUTES[name].given(mesh) is None:
                 lacking.setdefault(ATTRIBUTES[name].title, {})[id(mesh)] = shape.name
     for title, names in lacking.items():
-        found = plural(
+        problem = plural(
             len(names),
             f"mesh lacks the {title} that its material reads",
             f"meshes lack the {title} that their materials read",
         )
-        warn_caller(f"{found}, first: {next(iter(names.values()))!r}")
+        warn_caller(f"{problem}, first: {next(iter(names.values()))!r}")
     return sorted(read)
 
 
@@ -254,8 +254,8 @@ def number_materials(
     rows = len(meshes) + len(curved)
     counts = [len(mesh.faces) for mesh in meshes] + [shape.count for shape in curved]
     of_row = np.repeat(np.array(of_shape[:rows], np.intp), counts)
-    own = [instance.material is not instance.mesh.material for instance in instances]
-    replaced = np.where(own, np.array(of_shape[rows:], np.intp), -1) if any(own) else None
+    replaces = [instance.material is not instance.mesh.material for instance in instances]
+    replaced = np.where(replaces, np.array(of_shape[rows:], np.intp), -1) if any(replaces) else None
     return materials, of_row, replaced
 
 

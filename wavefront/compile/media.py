@@ -1,4 +1,4 @@
-"""The media of a scene: what each path is inside of, and how phase functions become materials."""
+"""The media of a scene: the media around each path, and how phase functions become materials."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ from .touching import TouchingFaces
 
 DEPTH = 4  # media that a path remembers, the last one that it entered first
 NEAR = 1e-6  # part of a box that may overlap another one by rounding
-LOWEST = np.iinfo(np.intp).min  # priority of what is around all shapes
+LOWEST = np.iinfo(np.intp).min  # priority of the medium around all shapes
 ENTRY = np.int16  # small: every path carries four
 
 
@@ -63,11 +63,11 @@ class PhaseBsdf(Bsdf):
 
 @soa
 class MediaTable:
-    """The media of a scene, and the entries of the stacks by which paths remember what they are inside of.
+    """The media of a scene, and the entries of the stacks by which paths remember the shapes around them.
 
-    Each material that encloses anything has an entry: a number from 1 on. Entry 0 is what is around all
-    shapes. A stack (4, n) has the entries of the shapes around each path, the last one that it entered
-    first, and then 0. The entry of the highest priority is what is there; of equal ones it is the first.
+    Each material that encloses anything has an entry: a number from 1 on. Entry 0 is the medium around
+    all shapes. A stack (4, n) has the entries of the shapes around each path, the last one that it entered
+    first, and then 0. The entry of the highest priority counts; of equal ones it is the first.
 
     Source: C. Schmidt and B. Budge, "Simple Nested Dielectrics in Ray Traced Images", Journal of Graphics
     Tools 7(2), 2002.
@@ -75,13 +75,13 @@ class MediaTable:
 
     entry_of: NDArray[Any]  # (materials,) and (phase functions,) after them; 0 for those that enclose nothing
     priority: Ints  # (entries,)
-    nested: Bools  # (entries,) whether the index of refraction of what is around counts
+    nested: Bools  # (entries,) whether the index of refraction of the medium around counts
     index: Floats  # (entries,) of refraction; 1 where `nested` is False
     medium_of: Ints  # (entries,) number of the medium, -1 for none
     records: tuple[MediumRecord, ...]  # one for each kind
     record_of: Ints  # (media,) which record has it
     column_of: Ints  # (media,) and in which column
-    event_of: Ints  # (media,) what stands for a primitive where a path is scattered: -2 − its phase function
+    event_of: Ints  # (media,) in place of a primitive where a path is scattered: -2 − its phase function
     scatters: Bools  # (media,)
     glows: bool  # any does
     light_of: Ints  # (media,) number of the light that samples its emission, -1 for none
@@ -99,7 +99,7 @@ class MediaTable:
         return not (self.scatters.any() or self.glows or self.takes_steps)
 
     def highest(self, stack: NDArray[Any]) -> NDArray[Any]:
-        """Return what there is inside of stacks (k, n): the entries (n,) of the highest priority."""
+        """Return the entries (n,) of the highest priority in stacks (k, n)."""
         best = stack[0]
         for entry in stack[1:]:
             if not entry.any():  # nor has any row after it
@@ -112,7 +112,7 @@ class MediaTable:
         return self.medium_of.take(self.highest(stack))
 
     def crossing(self, material: Ints, back_facing: Bools) -> NDArray[Any]:
-        """Return what crossing surfaces does to stacks (n,): the entry put there, negative if taken."""
+        """Return the change of stacks at surfaces (n,): the entry that is pushed, negative if removed."""
         entry = self.entry_of.take(material)
         return np.where(back_facing, -entry, entry)
 
@@ -132,10 +132,10 @@ class MediaTable:
 
     def holding(self, light: Ints, lights: int) -> Ints:
         """Return the media (n,) that lights (n,), of so many `lights`, are samples of; -1 for none."""
-        held = np.full(lights + 1, -1)
-        held[self.light_of] = np.arange(len(self.light_of))
-        held[-1] = -1
-        return held.take(light)
+        medium = np.full(lights + 1, -1)
+        medium[self.light_of] = np.arange(len(self.light_of))
+        medium[-1] = -1
+        return medium.take(light)
 
     def by_record(self, medium: Ints) -> Iterator[tuple[MediumRecord, Ints, Ints]]:
         """Yield each record that occurs among media (n,), the lanes (k,) that it has, and their columns."""
@@ -149,8 +149,8 @@ class MediaTable:
 def crossed(stack: NDArray[Any], crossing: NDArray[Any]) -> NDArray[Any]:
     """Return stacks (4, n) after `MediaTable.crossing` (n,), or after several, (k, n)."""
     if crossing.ndim == 2:
-        for each in crossing:
-            stack = crossed(stack, each)
+        for entries in crossing:
+            stack = crossed(stack, entries)
         return stack
     lanes = np.flatnonzero(crossing)
     if not lanes.size:
@@ -175,7 +175,7 @@ def stacks_leaving(stack: NDArray[Any], crossing: NDArray[Any], cos: Floats) -> 
     stack
         (4, n) of the rays that have come.
     crossing
-        (k, n) what crossing the surfaces does to stacks.
+        (k, n) changes of the stacks at the surfaces.
     cos
         (n,) cosine between the rays and the normal on the side from which the others came: they cross the
         surfaces where it is below 0.
@@ -209,7 +209,7 @@ def media_of(
     """
     inside = [material.interior for material in materials if material.interior is not None]
     needed = around is not None or any(material.priority is not None for material in materials)
-    varied = any(each.scatters or each.glows or each.bounds is not None for each in inside)
+    varied = any(medium.scatters or medium.glows or medium.bounds is not None for medium in inside)
     if not needed and not varied and alone():
         return []
     return list({id(medium): medium for medium in [*inside, *([] if around is None else [around])]}.values())
@@ -241,8 +241,8 @@ def media_table(
     center
         (3,) of the scene.
     """
-    priorities = [each.priority for each in materials]
-    if not media and all(each is None for each in priorities):
+    priorities = [material.priority for material in materials]
+    if not media and all(priority is None for priority in priorities):
         return None
     _check_apart(shapes)
     phases = list(dict.fromkeys(id(medium.phase) for medium in media if medium.scatters))
@@ -263,9 +263,9 @@ def media_table(
     records: list[MediumRecord] = []
     record_of, column_of = np.zeros(len(media), np.intp), np.zeros(len(media), np.intp)
     for place, kind in enumerate(kinds):
-        some = [each for each, medium in enumerate(media) if type(medium) is kind]
-        found = [media[each].record(center) for each in some]
-        records.append(type(found[0]).concatenate(found))
+        some = [index for index, medium in enumerate(media) if type(medium) is kind]
+        kind_records = [media[index].record(center) for index in some]
+        records.append(type(kind_records[0]).concatenate(kind_records))
         record_of[some], column_of[some] = place, np.arange(len(some))
     boxes = [shape.bounds for shape in shapes if shape.material.encloses]
     return MediaTable(
@@ -273,7 +273,7 @@ def media_table(
         priority=np.array([LOWEST, *(material.priority or 0 for material in holders)], np.intp),
         nested=nested,
         index=np.array([1, *map(_index, holders)], f4),
-        medium_of=np.array([-1 if each is None else number[id(each)] for each in inside], np.intp),
+        medium_of=np.array([-1 if medium is None else number[id(medium)] for medium in inside], np.intp),
         records=tuple(records),
         record_of=record_of,
         column_of=column_of,
@@ -308,7 +308,7 @@ def _check_apart(shapes: Sequence[Shape]) -> None:
         if medium is not None and medium.bounds is not None:
             (low, high), (first, last) = shape.bounds, medium.bounds
             placed.append((shape, medium, np.maximum(low, first), np.minimum(high, last)))
-    low, high = (np.array([each[side] for each in placed]).reshape(-1, 3) for side in (2, 3))
+    low, high = (np.array([placement[side] for placement in placed]).reshape(-1, 3) for side in (2, 3))
     for number, (shape, medium, *_) in enumerate(placed):
         shared = np.minimum(high, high[number]) - np.maximum(low, low[number])
         for other in np.flatnonzero((shared > NEAR * (high[number] - low[number])).all(1)):
@@ -323,7 +323,7 @@ def _check_apart(shapes: Sequence[Shape]) -> None:
 
 
 def _index(material: Material) -> float:
-    """Return the index of refraction of what a material encloses, if it has a priority."""
+    """Return the index of refraction inside a material that has a priority, 1 for others."""
     index = material.bsdf.index_inside
     if material.priority is None or index is None or material.bsdf.invisible:
         return 1.0

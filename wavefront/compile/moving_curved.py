@@ -62,6 +62,6 @@ PLACEMENT = ("mesh", "first", "to_local", "low", "high")
 
 
 def _single(triangles: int) -> InstanceTable:
-    """Return the columns of what is not instanced, where no mesh is."""
+    """Return the columns of shapes that are not instanced, where no mesh is."""
     same = np.repeat(np.eye(3).reshape(9, 1), 2, 1).astype(f4)
     return InstanceTable(np.array([0, triangles]), np.zeros(2, np.intp), same, same, np.zeros(2, f4), None)

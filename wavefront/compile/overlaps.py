@@ -37,19 +37,19 @@ def overlapping_instances(instances: Sequence[Instance], meshes: Sequence[Mesh])
         return set()
     corners, owner = _placed_corners(instances)
     middle = (low + high) / 2
-    triangles: Floats = np.concatenate([(part - middle).astype(f4) for part in (*corners, *near)])
-    of_meshes = np.repeat(np.arange(len(meshes)), [len(part) for part in near]) + len(instances)
+    triangles: Floats = np.concatenate([(faces - middle).astype(f4) for faces in (*corners, *near)])
+    of_meshes = np.repeat(np.arange(len(meshes)), [len(faces) for faces in near]) + len(instances)
     owner = np.concatenate([owner, of_meshes])
-    found = find_overlaps(
+    overlaps = find_overlaps(
         triangles, np.flatnonzero(has_area(triangles)), triangle_table(triangles, False).plane
     )
-    if found is None:
+    if overlaps is None:
         return set()
-    of_face = owner.take(found.face)
-    lowest, highest = np.full(found.face.size, owner.max() + 1), np.full(found.face.size, -1)
-    np.minimum.at(lowest, found.group, of_face)
-    np.maximum.at(highest, found.group, of_face)
-    several: Ints = np.unique(of_face.compress((lowest != highest).take(found.group)))
+    of_face = owner.take(overlaps.face)
+    lowest, highest = np.full(overlaps.face.size, owner.max() + 1), np.full(overlaps.face.size, -1)
+    np.minimum.at(lowest, overlaps.group, of_face)
+    np.maximum.at(highest, overlaps.group, of_face)
+    several: Ints = np.unique(of_face.compress((lowest != highest).take(overlaps.group)))
     return {id(instances[number]) for number in several.tolist() if number < len(instances)}
 
 

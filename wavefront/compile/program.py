@@ -2,8 +2,8 @@
 
 A feature is what few scenes have, such as a background or absorption. It is one file in features/: a class
 that says when a scene has it, and overrides the points where it acts. Each kind of feature is asked once,
-when a scene is compiled. Stages then go through tuples that hold what acts at a point, and nothing else: a
-scene without features pays for none, and no stage asks for what is absent.
+when a scene is compiled. Stages then go through tuples of the features that act at a point: a scene
+without features pays for none, and no stage asks for absent ones.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ if TYPE_CHECKING:
 
 @soa
 class Facts:
-    """What features decide by whether a scene has them."""
+    """The facts of a scene by which features decide whether it has them."""
 
     scene: Scene
     compiled: CompiledScene  # its arrays; its program is empty so far
@@ -53,7 +53,7 @@ class Leg:
     left: Ints  # (n,) primitives that the paths have left, -1 for none
     paths: Paths
     hits: Hits
-    emission: Contribution = field(init=False)  # what the paths meet
+    emission: Contribution = field(init=False)  # of the surfaces and lights that the paths meet
     lanes: Ints = field(init=False)  # (k,) of the paths that go on
     kept_paths: Paths = field(init=False)  # those, as they will be shaded
     kept_hits: Hits = field(init=False)
@@ -81,7 +81,7 @@ class Passage:
 
 
 class Feature:
-    """What few scenes have, and where it acts. A subclass overrides `of` and the points where it acts.
+    """A rare property of scenes. A subclass overrides `of` and the points where it acts.
 
     A feature is sent to workers with the scene, so its attributes are arrays and the like. Those of your own
     are given as `features=` of a render. They act after all others. Paths from lights do not meet them.
@@ -99,7 +99,7 @@ class Feature:
     shading
         A subclass of `stages.shade.Shading` whose methods act where surfaces are shaded; None for none.
     surfaces
-        A subclass of `stages.interaction.Surfaces` that changes what is known of hits; None for none.
+        A subclass of `stages.interaction.Surfaces` that changes the data of hits; None for none.
     ways
         In how many ways each path goes on from its first surface.
     dimensions
@@ -174,7 +174,7 @@ class Feature:
         raise NotImplementedError
 
     def dim(self, part: Floats, scene: CompiledScene, rays: Any, length: Floats, end: Bools) -> None:
-        """Lower, in place, what part (3, n) of light gets along shadow rays over some lengths (n,).
+        """Lower, in place, the part (3, n) of light that passes along shadow rays of some lengths (n,).
 
         `end` (n,) says which rays end there.
         """
@@ -198,22 +198,22 @@ def check_features(name: str, value: Any) -> tuple[Feature, ...]:
     SceneError
         If something else is among them.
     """
-    given = tuple(value) if isinstance(value, list | tuple) else (value,)
-    for each in given:
-        if not isinstance(each, Feature):
+    features = tuple(value) if isinstance(value, list | tuple) else (value,)
+    for feature in features:
+        if not isinstance(feature, Feature):
             raise SceneError(
                 f"{name} is {in_brief(value)}; it must be one or more objects of subclasses of wf.Feature"
             )
-    return given
+    return features
 
 
 class LegProgram:
-    """What acts on a leg: for each point, a tuple of what features do there; empty for most scenes."""
+    """The features of a leg: for each point, a tuple of methods that act there; empty for most scenes."""
 
     __slots__ = (*LEG_POINTS, "see_through")
 
     def __init__(self, features: Sequence[Feature]) -> None:
-        self.see_through = tuple(each for each in features if acts(each, "passable"))
+        self.see_through = tuple(feature for feature in features if acts(feature, "passable"))
         self.fly, self.meet = (_at(features, point) for point in LEG_POINTS)
 
 
@@ -228,15 +228,15 @@ class Program:
     Attributes
     ----------
     expose, begin, walk, cross, dim, tilt, weaken
-        What acts at these points.
+        Methods that act at these points.
     shading, surfaces
-        What surfaces are when they are shaded, and when they are hit, the outermost kind first.
+        Classes of surfaces when they are shaded, and when they are hit, the outermost kind first.
     see_through
-        What shadow rays may pass.
+        Features of surfaces that shadow rays may pass.
     seen_through
-        What rays of the camera may pass where nothing is random.
+        Features of surfaces that rays of the camera may pass where nothing is random.
     unseen
-        What the camera does not see as a surface.
+        Features whose surfaces the camera does not see.
     dims_shadows
         Whether shadow rays may arrive with a part of their light.
     branches
@@ -245,21 +245,25 @@ class Program:
 
     def __init__(self, features: Sequence[Feature] = ()) -> None:
         self.features = tuple(features)
-        everywhere = [each for each in features if not each.camera_only]
+        everywhere = [feature for feature in features if not feature.camera_only]
         self._camera, self._later = LegProgram(self.features), LegProgram(everywhere)
         self.expose, self.begin, self.walk, self.cross, self.dim, self.tilt, self.weaken = (
             _at(self.features, point)
             for point in ("expose", "begin", "walk", "cross", "dim", "tilt", "weaken")
         )
         self.shading, self.surfaces = (
-            tuple(getattr(each, name) for each in reversed(self.features) if getattr(each, name) is not None)
+            tuple(
+                getattr(feature, name)
+                for feature in reversed(self.features)
+                if getattr(feature, name) is not None
+            )
             for name in ("shading", "surfaces")
         )
-        self.branches = math.prod(each.ways for each in self.features)
+        self.branches = math.prod(feature.ways for feature in self.features)
         self.see_through = self._later.see_through
-        self.seen_through = tuple(each for each in self._camera.see_through if not each.drawn)
-        self.unseen = tuple(each for each in self._camera.see_through if each.camera_only)
-        self.dims_shadows = bool(self.dim) or any(each.dims_shadows for each in self.see_through)
+        self.seen_through = tuple(feature for feature in self._camera.see_through if not feature.drawn)
+        self.unseen = tuple(feature for feature in self._camera.see_through if feature.camera_only)
+        self.dims_shadows = bool(self.dim) or any(feature.dims_shadows for feature in self.see_through)
 
     @classmethod
     def of(cls, facts: Facts, kinds: Sequence[type[Feature]]) -> Self:
@@ -271,7 +275,7 @@ class Program:
         return cls([*facts.found, *facts.given])
 
     def leg(self, bounce: int) -> LegProgram:
-        """Return what acts on the leg that ends at a bounce."""
+        """Return the program of the leg that ends at a bounce."""
         return self._later if bounce else self._camera
 
     def ways(self, bounce: int) -> int:
@@ -284,15 +288,15 @@ class Program:
 
     def of_sensors(self) -> Program:
         """Return the program of paths that start at sensors: these measure the light that is there."""
-        return Program([each for each in self.features if not each.camera_only])
+        return Program([feature for feature in self.features if not feature.camera_only])
 
     def of_lights(self) -> Program:
         """Return the program of paths from lights."""
-        return Program([each for each in self.features if each.from_lights])
+        return Program([feature for feature in self.features if feature.from_lights])
 
     def find(self, kind: type[AnyFeature]) -> AnyFeature | None:
         """Return the feature of a kind; None if the scene does not have it."""
-        return next((each for each in self.features if isinstance(each, kind)), None)
+        return next((feature for feature in self.features if isinstance(feature, kind)), None)
 
     def __reduce__(self) -> tuple[Any, ...]:
         """Send only the features to other processes."""
@@ -305,4 +309,4 @@ def acts(feature: Feature, point: str) -> bool:
 
 
 def _at(features: Sequence[Feature], point: str) -> tuple[Any, ...]:
-    return tuple(getattr(each, point) for each in features if acts(each, point))
+    return tuple(getattr(feature, point) for feature in features if acts(feature, point))

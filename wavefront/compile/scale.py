@@ -40,32 +40,32 @@ def scaled_shapes(shapes: Sequence[Shape], factor: float) -> list[Shape]:
     cancel. Shared meshes, materials and media stay shared.
     """
     placed = {id(shape.mesh): shape.mesh for shape in shapes if isinstance(shape, Instance)}
-    own = {key: length_factor(_radius(mesh)) for key, mesh in placed.items()}
-    if factor == 1 and all(each == 1 for each in own.values()):
+    factors = {key: length_factor(_radius(mesh)) for key, mesh in placed.items()}
+    if factor == 1 and all(mesh_factor == 1 for mesh_factor in factors.values()):
         return list(shapes)
     materials: dict[int, Material] = {}
     media: dict[int, BaseMedium] = {}
 
-    def material(given: Material) -> Material:
-        if id(given) not in materials:
-            materials[id(given)] = scaled = given.scaled(factor)
-            if scaled.interior is not given.interior and scaled.interior is not None:
-                scaled.interior = media.setdefault(id(given.interior), scaled.interior)
-        return materials[id(given)]
+    def material(unscaled: Material) -> Material:
+        if id(unscaled) not in materials:
+            materials[id(unscaled)] = scaled = unscaled.scaled(factor)
+            if scaled.interior is not unscaled.interior and scaled.interior is not None:
+                scaled.interior = media.setdefault(id(unscaled.interior), scaled.interior)
+        return materials[id(unscaled)]
 
     meshes = {
-        key: _with_material(mesh.lengths_times(own[key]), material(mesh.material))
+        key: _with_material(mesh.lengths_times(factors[key]), material(mesh.material))
         for key, mesh in placed.items()
     }
     out: list[Shape] = []
     for shape in shapes:
         if isinstance(shape, Instance):
-            part: Shape = shape.with_mesh(factor, meshes[id(shape.mesh)], own[id(shape.mesh)])
+            resized: Shape = shape.with_mesh(factor, meshes[id(shape.mesh)], factors[id(shape.mesh)])
         elif isinstance(shape, Mesh | CurvedShape):
-            part = shape.lengths_times(factor)
+            resized = shape.lengths_times(factor)
         else:
             raise SceneError(f"{shape.name}: cannot scale a {type(shape).__name__}")
-        out.append(_with_material(part, material(shape.material)))
+        out.append(_with_material(resized, material(shape.material)))
     return out
 
 

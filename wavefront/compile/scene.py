@@ -131,7 +131,7 @@ def gather_scene(
     caustics: bool = False,
     asked: Mapping[str, Any] | None = None,
 ) -> Facts:
-    """Gather a scene into flat arrays, and return these with what features decide by.
+    """Gather a scene into flat arrays, and return these with the facts by which features decide.
 
     Parameters
     ----------

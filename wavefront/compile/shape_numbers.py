@@ -11,7 +11,7 @@ from ..arrays.state import Hits
 from ..arrays.vec import Ints
 from ..shapes import CurvedShape, Instance, Mesh
 
-SINGLE_COLUMNS = 2  # of the `InstanceTable`, for what is not instanced
+SINGLE_COLUMNS = 2  # of the `InstanceTable`, for shapes that are not instanced
 
 
 @soa

@@ -1,7 +1,7 @@
 """Faces of shapes that hold something, where they lie on those of other such shapes, or back to back.
 
-A ray meets only one of two surfaces at one place, and goes on behind both. So that it is known what it is
-inside of, it is told the other one, too.
+A ray meets only one of two surfaces at one place, and goes on behind both. So that its media are
+known, it is told the other one, too.
 """
 
 from __future__ import annotations
@@ -62,7 +62,7 @@ def find_touching(triangles: Floats, shape: Ints, material: Ints, holds: Bools) 
     layer = _layers(overlaps.group, shape.take(face), normal)
     number = np.full(len(triangles), -1)
     number[face] = np.arange(face.size)
-    members = tuple(np.flatnonzero(layer == each) for each in range(layer.max() + 1))
+    members = tuple(np.flatnonzero(layer == level) for level in range(layer.max() + 1))
     return TouchingFaces(
         number,
         overlaps.group,
