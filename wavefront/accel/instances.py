@@ -258,18 +258,14 @@ def _nearest_first(packed: NDArray[np.int64], t_far: Floats, bits: int) -> Itera
         taken *= 2
 
 
-def _update_closest(hits: Intersections, lane: Ints, candidates: Intersections) -> None:
-    """Replace hits on lanes (p,), of which some may be equal, by those of `candidates` that are nearer."""
+def _update_closest(hits: Intersections, lane: Ints, others: Intersections) -> None:
+    """Replace hits on lanes (p,), of which some may be equal, by those of `others` that are nearer."""
     t, prim = hits.t.take(lane), hits.prim.take(lane)
-    nearer = np.flatnonzero(
-        (candidates.t < t) | ((candidates.t == t) & (candidates.prim < prim) & (candidates.prim >= 0))
-    )
+    nearer = np.flatnonzero((others.t < t) | ((others.t == t) & (others.prim < prim) & (others.prim >= 0)))
     if (lane[1:] <= lane[:-1]).any():  # else each lane occurs once
-        nearer = nearer.take(
-            np.lexsort((candidates.prim.take(nearer), candidates.t.take(nearer), lane.take(nearer)))
-        )
+        nearer = nearer.take(np.lexsort((others.prim.take(nearer), others.t.take(nearer), lane.take(nearer))))
         ordered = lane.take(nearer)
         nearer = nearer.compress(np.append(True, ordered[1:] != ordered[:-1])[: ordered.size])
     lane = lane.take(nearer)
-    hits.t[lane], hits.prim[lane] = candidates.t.take(nearer), candidates.prim.take(nearer)
-    hits.b1[lane], hits.b2[lane] = candidates.b1.take(nearer), candidates.b2.take(nearer)
+    hits.t[lane], hits.prim[lane] = others.t.take(nearer), others.prim.take(nearer)
+    hits.b1[lane], hits.b2[lane] = others.b1.take(nearer), others.b2.take(nearer)

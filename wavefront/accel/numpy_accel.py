@@ -39,10 +39,7 @@ def _ball_of(geometry: Geometry) -> Ball:
     corners += [geometry.triangles.reshape(-1, 3)] if len(geometry.triangles) else []
     if not corners:
         return Ball(np.zeros(3, f4), 1.0)
-    low, high = (
-        np.stack([points.min(0) for points in corners], 1),
-        np.stack([points.max(0) for points in corners], 1),
-    )
+    low, high = np.stack([rows.min(0) for rows in corners], 1), np.stack([rows.max(0) for rows in corners], 1)
     return bounding_ball(low, high)
 
 

@@ -111,10 +111,9 @@ def sphere_rows(centers: Doubles, radii: Doubles, center: Floats, radius: float)
     c = centers - np.asarray(center, np.float64)[:, None]
     x, y, z = c
     size2 = x * x + y * y + z * z
-    ones = np.ones_like(radii)
+    one = np.ones_like(radii)
     rows = np.stack(
-        [radii**2 - size2, -ones, 2 * x, 2 * y, 2 * z, x * x, y * y, z * z, 2 * x * y, 2 * x * z, 2 * y * z],
-        1,
+        [radii**2 - size2, -one, 2 * x, 2 * y, 2 * z, x * x, y * y, z * z, 2 * x * y, 2 * x * z, 2 * y * z], 1
     )
     error = 150 * ROUNDOFF * radius * radius
     return (rows / error).astype(f4)

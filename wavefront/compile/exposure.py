@@ -1,4 +1,4 @@
-"""A scene in the middle of the time for which a shutter is open, and what of it moves meanwhile."""
+"""A scene in the middle of the time for which a shutter is open, and the motions of its parts."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ EVEN = 1e-5  # relative difference of scales along two axes that does not matter
 
 
 def exposed_scene(scene: Scene, shutter: Shutter | None) -> Exposed:
-    """Return a scene in the middle of the time for which a shutter is open, and what of it moves.
+    """Return a scene in the middle of the time for which a shutter is open, and the motions of its parts.
 
     Without a shutter it is the scene itself.
 
@@ -38,49 +38,49 @@ def exposed_scene(scene: Scene, shutter: Shutter | None) -> Exposed:
     if shutter is None:
         return Exposed(scene)
     scene = _sampled(scene, shutter)
-    if not any(_moves(each, shutter) for each in (*scene.shapes, *scene.lights)):
+    if not any(_moves(element, shutter) for element in (*scene.shapes, *scene.lights)):
         return Exposed(scene.at(shutter.middle))
     still, moving = copy(scene), [shape for shape in scene.shapes if _moves(shape, shutter)]
     times = np.linspace(shutter.begin, shutter.end, TIMES).tolist()
     boxes = [Scene([shape.at(time) for shape in moving]).bounds for time in times if moving]
-    found, forms = Exposed(still, shutter, boxes=tuple(boxes)), _Forms(shutter)
+    exposed, forms = Exposed(still, shutter, boxes=tuple(boxes)), _Forms(shutter)
     shapes = [shape.at(shutter.middle) for shape in scene.shapes]
     for number, shape in enumerate(scene.shapes):
         if _moves(shape, shutter):
-            shapes[number], found.movers[number] = forms.mover(shape, shapes[number])
+            shapes[number], exposed.movers[number] = forms.mover(shape, shapes[number])
     still.shapes = shapes
     still.lights = [light.at(shutter.middle) for light in scene.lights]
     for number, light in enumerate(scene.lights):
         if _moves(light, shutter):
-            found.lights[number] = _rigid(light, shutter)
-    return found
+            exposed.lights[number] = _rigid(light, shutter)
+    return exposed
 
 
 def _sampled(scene: Scene, shutter: Shutter) -> Scene:
     """Return a scene whose file is read anew for each time with meshes that deform in its place.
 
-    They go along lines between the forms of some times. What else changes is as in the middle of the time.
+    They go along lines between the forms of some times. Other changes are left out.
     """
     if scene.file_moments is None:
         return scene
     times = np.linspace(shutter.begin, shutter.end, TIMES)
     moments = [scene.at(time) for time in times.tolist()]
-    found, middle = copy(scene), moments[TIMES // 2]
-    found.file_moments, columns = None, [moment.shapes for moment in moments]
+    sampled, middle = copy(scene), moments[TIMES // 2]
+    sampled.file_moments, columns = None, [moment.shapes for moment in moments]
     if len({len(shapes) for shapes in columns}) > 1:
         warn_caller("shapes of the file come or go while the shutter is open; they are as in the middle")
         columns = [middle.shapes]
-    found.shapes = [_over_time(list(shapes), times) for shapes in zip(*columns, strict=True)]
-    found.lights = middle.lights
-    return found
+    sampled.shapes = [_over_time(list(shapes), times) for shapes in zip(*columns, strict=True)]
+    sampled.lights = middle.lights
+    return sampled
 
 
 def _over_time(shapes: list[Shape], times: Doubles) -> Shape:
     """Return a shape that is one of several at each of some times, all of one kind."""
     middle = shapes[len(shapes) // 2]
-    if all(each is middle for each in shapes):
+    if all(shape is middle for shape in shapes):
         return middle
-    meshes: list[Any] = [each.to_mesh() if isinstance(each, Instance) else each for each in shapes]
+    meshes: list[Any] = [shape.to_mesh() if isinstance(shape, Instance) else shape for shape in shapes]
     first = meshes[0]
     for mesh in meshes:
         same = isinstance(mesh, Mesh) and isinstance(first, Mesh) and np.array_equal(mesh.faces, first.faces)
@@ -107,13 +107,13 @@ def _moves(element: Moving, shutter: Shutter) -> bool:
 
 
 class _Forms:
-    """How shapes move, and what is traced of them; meshes that several instances share stay shared."""
+    """How shapes move, and the shapes to trace; meshes that several instances share stay shared."""
 
     def __init__(self, shutter: Shutter) -> None:
-        self._shutter, self._meshes = shutter, dict[int, tuple[Mesh, Mesh]]()  # with what they are of
+        self._shutter, self._meshes = shutter, dict[int, tuple[Mesh, Mesh]]()  # with the originals
 
     def mover(self, shape: Shape, then: Shape) -> tuple[Shape, Mover]:
-        """Return what is traced of a shape, given what it is in the middle of the time, and how it moves."""
+        """Return the shape to trace, and its motion; `then` is the shape in the middle of the time."""
         if isinstance(shape, Mesh):
             return self._of_mesh(shape, then, shape, _matrices(shape))
         if isinstance(shape, Instance):

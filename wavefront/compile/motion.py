@@ -1,4 +1,4 @@
-"""What moves of a scene while a shutter is open, and where it is at the time of a path.
+"""Shapes and lights that move while a shutter is open, and their places at the time of a path.
 
 The arrays of a compiled scene hold it as it is in the middle of that time. What moves is an instance in them:
 each ray meets it by the matrix of its own time. A mesh that deforms has its corners at several times, as an
@@ -27,7 +27,7 @@ from ..scene import Scene
 from ..shapes import Instance, Mesh
 from .geometry import compute_corner_normals, compute_face_normals
 
-BOX_ROOM = 2.0**-17  # margin of boxes of what moves, relative to their size
+BOX_ROOM = 2.0**-17  # margin of boxes of moving shapes, relative to their size
 FAST = 4.0  # edges that corners of a deforming mesh may go within a step
 MOST_PARTS = 4  # into which such a step is divided
 IDENTITY = np.eye(4)
@@ -46,13 +46,13 @@ class Mover:
 
 @soa
 class Exposed:
-    """A scene in the middle of the time for which a shutter is open, and what of it moves."""
+    """A scene in the middle of the time for which a shutter is open, and the motions of its parts."""
 
     scene: Scene
     shutter: Shutter | None = None  # None where nothing moves
     movers: dict[int, Mover] = field(default_factory=dict)  # by the number of the shape
     lights: dict[int, Matrices] = field(default_factory=dict)  # matrices, likewise
-    boxes: tuple[Doubles, ...] = ()  # (2, 3) each, the corners of what moves at some times
+    boxes: tuple[Doubles, ...] = ()  # (2, 3) each, the corners of all that moves at some times
 
     @property
     def bounds(self) -> Doubles:
@@ -82,34 +82,34 @@ class DeformingRows:
     @property
     def box(self) -> tuple[Doubles, Doubles]:
         """The corners (3,) of the box of all places."""
-        points = [each.reshape(-1, 3).astype(np.float64) for each in self.corners]
-        return np.min([each.min(0) for each in points], 0), np.max([each.max(0) for each in points], 0)
+        points = [form.reshape(-1, 3).astype(np.float64) for form in self.corners]
+        return np.min([form.min(0) for form in points], 0), np.max([form.max(0) for form in points], 0)
 
     def face_normals(self, row: Ints, time: Doubles) -> Floats:
         """Return the unit normals (3, n) of triangles, by their rows (n,), at times (n,)."""
-        step, part = step_at(self.times, time)
-        found = np.empty((3, row.size), f4)
+        step, fraction = step_at(self.times, time)
+        normals = np.empty((3, row.size), f4)
         for number in range(len(self.corners) - 1):
             lanes = np.flatnonzero(step == number)
             at = row.take(lanes) - self.first
             before, after = (self.corners[number + side].take(at, 0).astype(np.float64) for side in (0, 1))
-            found[:, lanes] = compute_face_normals(
-                before + (after - before) * part.take(lanes)[:, None, None]
+            normals[:, lanes] = compute_face_normals(
+                before + (after - before) * fraction.take(lanes)[:, None, None]
             )
-        return found
+        return normals
 
     def vertex_normals(self, row: Ints, time: Doubles) -> list[Floats]:
         """Return the normals of vertices, 3 × (3, n), of triangles at times; not of unit length."""
         assert self.normals is not None
-        step, part = step_at(self.times, time)
-        found = [np.empty((3, row.size), f4) for _ in range(3)]
+        step, fraction = step_at(self.times, time)
+        normals = [np.empty((3, row.size), f4) for _ in range(3)]
         for number in range(len(self.normals) - 1):
             lanes = np.flatnonzero(step == number)
-            at, share = row.take(lanes) - self.first, part.take(lanes).astype(f4)
-            for corner, values in enumerate(found):
+            at, share = row.take(lanes) - self.first, fraction.take(lanes).astype(f4)
+            for corner, values in enumerate(normals):
                 before, after = (self.normals[number + side][corner].take(at, 1) for side in (0, 1))
                 values[:, lanes] = before + (after - before) * share
-        return found
+        return normals
 
 
 @soa
@@ -131,21 +131,21 @@ class CurvedRows:
         """Return how far spheres, by rows (n,), are at times (n,) from where `kind` has them, (3, n)."""
         assert self.centers is not None
         assert isinstance(self.kind, SpherePrimitives)
-        (step, part), at = step_at(self.times, time), row - self.first
+        (step, fraction), at = step_at(self.times, time), row - self.first
         rows, count = self.centers.transpose(1, 0, 2).reshape(3, -1).astype(np.float64), len(self.kind)
         before, after = rows.take(step * count + at, 1), rows.take((step + 1) * count + at, 1)
-        return np.asarray(before + (after - before) * part - self.kind.centers.take(at, 1))
+        return np.asarray(before + (after - before) * fraction - self.kind.centers.take(at, 1))
 
 
 @soa
 class MotionTable:
-    """Where what moves is at a time."""
+    """The places of moving shapes at a time."""
 
     shutter: Shutter
     motions: Motions | None  # of shapes; None where only lights move
     mover: Ints  # (p,) the motion of each column of the `InstanceTable`, -1 for none
     scale: Floats  # (p,) by which normals are multiplied, so that their lengths are at most 1
-    column_of_row: Ints  # (rows,) column of the `InstanceTable` of what moves, by the scene's tables; else 0
+    column_of_row: Ints  # (rows,) column of the `InstanceTable` of moving shapes, by table row; else 0
     deformations: tuple[DeformingRows, ...]
     curved: tuple[CurvedRows, ...]
 
@@ -157,13 +157,13 @@ class MotionTable:
         return rigid
 
     def column_at(self, hits: Hits) -> Ints:
-        """Return the columns (n,) of the `InstanceTable` at hits; those that do not know find what moves."""
+        """Return the columns (n,) of the `InstanceTable` at hits; without `instance`, of moving shapes."""
         return self.column_of_row.take(hits.prim) if hits.instance is None else hits.instance
 
     def deformation_of(self, row: Ints) -> list[tuple[DeformingRows, Ints]]:
         """Return the meshes that deform among rows (n,) of the scene's tables, and the lanes of each."""
-        found = [(each, np.flatnonzero((row >= each.first) & (row < each.end))) for each in self.deformations]
-        return [(each, lanes) for each, lanes in found if lanes.size]
+        pairs = [(mesh, np.flatnonzero((row >= mesh.first) & (row < mesh.end))) for mesh in self.deformations]
+        return [(mesh, lanes) for mesh, lanes in pairs if lanes.size]
 
 
 def deforming_rows(
@@ -174,7 +174,7 @@ def deforming_rows(
     Parameters
     ----------
     mesh, still
-        The mesh, and what it is in the middle of the time.
+        The mesh, and its form in the middle of the time.
     keys
         (n,) s, times between which its vertices go along lines.
     first
@@ -185,17 +185,17 @@ def deforming_rows(
     times = _steps_of(mesh, keys, shutter)
     middle = still.bounds.mean(0)
     meshes = [mesh.at(time) for time in times.tolist()]
-    parts = (times - shutter.middle) / (shutter.end - shutter.begin)
+    fractions = (times - shutter.middle) / (shutter.end - shutter.begin)
     corners = [
-        (each.vertices - middle - drift * part).take(mesh.faces, 0).astype(f4)
-        for each, part in zip(meshes, parts, strict=True)
+        (form.vertices - middle - drift * fraction).take(mesh.faces, 0).astype(f4)
+        for form, fraction in zip(meshes, fractions, strict=True)
     ]
     normals = None
     if still.normals is not None:
-        flat = [compute_face_normals(each) for each in corners]
+        flat = [compute_face_normals(triangles) for triangles in corners]
         normals = [
-            compute_corner_normals([each], face) or (face,) * 3
-            for each, face in zip(meshes, flat, strict=True)
+            compute_corner_normals([form], face) or (face,) * 3
+            for form, face in zip(meshes, flat, strict=True)
         ]
     return DeformingRows(first, times, corners, normals)
 
@@ -260,25 +260,25 @@ def motion_table(
         `kinds` are the last ones.
     """
     assert exposed.shutter is not None
-    found = _Found(np.zeros(rows_in_all, np.intp))
+    columns = _MotionColumns(np.zeros(rows_in_all, np.intp))
     shutter, k = exposed.shutter, numbers.size - len(instances)
     row_of = _first_rows(shared, first_row)
     for instance, number in zip(instances, numbers[k:].tolist(), strict=True):
         if number in exposed.movers:
             unit = _unit_of(instance, exposed.scene.shapes[number])
             moving, row = exposed.movers[number], row_of[id(instance.mesh)]
-            found.add_mesh(moving, instance.mesh, row, shutter, center, factor, unit)
+            columns.add_mesh(moving, instance.mesh, row, shutter, center, factor, unit)
         else:
-            found.add_still()
+            columns.add_still()
     row = rows_in_all - sum(map(len, kinds))
     for kind, number in zip(kinds, numbers[k - len(kinds) : k].tolist(), strict=True):
-        found.add_curved(exposed.movers[number], kind, row, shutter, center, factor)
+        columns.add_curved(exposed.movers[number], kind, row, shutter, center, factor)
         row += len(kind)
-    if placements is None or not found.matrices:
-        return MotionTable(shutter, None, np.full(2, -1), np.ones(2), found.column_of_row, (), ())
-    low, high = (np.stack(corners) for corners in zip(*found.boxes, strict=True))
+    if placements is None or not columns.matrices:
+        return MotionTable(shutter, None, np.full(2, -1), np.ones(2), columns.column_of_row, (), ())
+    low, high = (np.stack(corners) for corners in zip(*columns.boxes, strict=True))
     reach = np.linalg.norm(np.maximum(np.abs(low), np.abs(high)), axis=1)
-    motions, mover = Motions.of(found.matrices, shutter.begin, shutter.end, reach), np.array(found.mover)
+    motions, mover = Motions.of(columns.matrices, shutter.begin, shutter.end, reach), np.array(columns.mover)
     moves = np.flatnonzero(mover >= 0)
     placements.low[:, moves], placements.high[:, moves] = _swept_boxes(motions, low, high)
     longest = np.linalg.norm(placements.to_local.T.reshape(-1, 3, 4)[:, :, :3], 2, (1, 2))
@@ -287,14 +287,14 @@ def motion_table(
         motions,
         np.append([-1, -1], mover),
         np.append([1, 1], 1 / longest),
-        found.column_of_row,
-        tuple(found.deforming.values()),
-        tuple(found.curved),
+        columns.column_of_row,
+        tuple(columns.deforming.values()),
+        tuple(columns.curved),
     )
 
 
-class _Found:
-    """What has been found out of instances, in their order."""
+class _MotionColumns:
+    """The columns of a `MotionTable` while it is built, in the order of the instances."""
 
     def __init__(self, column_of_row: Ints) -> None:
         self.column_of_row, self.mover = column_of_row, list[int]()
@@ -336,15 +336,15 @@ class _Found:
         factor: float,
     ) -> None:
         """Add a curved shape, whose first primitive has a row in the scene's tables."""
-        found = CurvedRows(row, kind, np.array([shutter.begin, shutter.end]))
+        rows = CurvedRows(row, kind, np.array([shutter.begin, shutter.end]))
         bounds = [kind.bounds]
         if moving.centers is not None:
-            found.times = _times_of(moving.keys, shutter)
-            places = [moving.centers(time) * factor - center for time in found.times.tolist()]
-            found.centers = np.stack(places).transpose(0, 2, 1).astype(f4)
-            bounds = [each.bounds for each in found.swept()]
-        self.curved.append(found)
-        low, high = (np.concatenate([each[side] for each in bounds], 1).astype(np.float64) for side in (0, 1))
+            rows.times = _times_of(moving.keys, shutter)
+            places = [moving.centers(time) * factor - center for time in rows.times.tolist()]
+            rows.centers = np.stack(places).transpose(0, 2, 1).astype(f4)
+            bounds = [swept.bounds for swept in rows.swept()]
+        self.curved.append(rows)
+        low, high = (np.concatenate([pair[side] for pair in bounds], 1).astype(np.float64) for side in (0, 1))
         box = low.min(1), high.max(1)
         self._add(_about(moving.matrices, shutter, center, factor), box, row, len(kind))
 
@@ -362,9 +362,9 @@ def _first_rows(shared: Sequence[Mesh], first_row: int) -> dict[int, int]:
     return {id(mesh): begin for mesh, begin in zip(shared, begins.tolist(), strict=True)}
 
 
-def _unit_of(scaled: Instance, given: Any) -> float:
-    """Return by what the linear part of the transform of an instance was multiplied."""
-    return float(np.linalg.norm(scaled.transform[:3, :3]) / np.linalg.norm(given.transform[:3, :3]))
+def _unit_of(scaled: Instance, original: Any) -> float:
+    """Return the factor by which the linear part of the transform of an instance was multiplied."""
+    return float(np.linalg.norm(scaled.transform[:3, :3]) / np.linalg.norm(original.transform[:3, :3]))
 
 
 def _drift(mesh: Mesh, shutter: Shutter) -> Doubles:
@@ -402,7 +402,7 @@ def _half_box(mesh: Mesh) -> tuple[Doubles, Doubles]:
 
 
 def _swept_boxes(motions: Motions, low: Doubles, high: Doubles) -> tuple[Floats, Floats]:
-    """Return the corners (3, m) of boxes of what moves, with boxes (m, 3) of its own, at all times."""
+    """Return the corners (3, m) of boxes around moving shapes at all times, from their own boxes (m, 3)."""
     lows, highs = [], []
     to_local = motions.to_local.T.reshape(len(low), -1, 3, 4)
     for own_low, own_high, matrix in zip(low, high, to_local, strict=True):
@@ -446,11 +446,12 @@ def place_accelerators(
     if table is None or table.motions is None:
         built = [make_accelerator(Geometry(corners, (), weights)) for corners in triangles]
         return InstanceAccelerator(single, built, placements)
-    deforming, row, meshes = {each.first: each for each in table.deformations}, first_row, list[Any]()
+    deforming = {deformation.first: deformation for deformation in table.deformations}
+    row, meshes = first_row, list[Any]()
     for corners in triangles:
         if row in deforming:
-            each = deforming[row]
-            meshes.append(DeformingAccelerator(each.times, each.swept(), weights))
+            deformation = deforming[row]
+            meshes.append(DeformingAccelerator(deformation.times, deformation.swept(), weights))
         else:
             meshes.append(make_accelerator(Geometry(corners, (), weights)))
         row += len(corners)

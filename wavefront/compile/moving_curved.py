@@ -46,14 +46,14 @@ def with_curved(
     ids, shift = first + before, np.full(k, first - first_row)
     low = np.stack([kind.bounds[0].min(1) for kind in kinds], 1)
     high = np.stack([kind.bounds[1].max(1) for kind in kinds], 1)
-    own = Placements(meshes + np.arange(k), ids, np.repeat(np.eye(3, 4).reshape(12, 1), k, 1), low, high)
+    curved = Placements(meshes + np.arange(k), ids, np.repeat(np.eye(3, 4).reshape(12, 1), k, 1), low, high)
     turn = np.repeat(np.eye(3).reshape(9, 1), k, 1).astype(f4)
     radius = (np.linalg.norm(high - low, axis=0) / 2).astype(f4)
     material = None if table is None or table.material is None else np.full(k, -1)
     columns = InstanceTable(ids, shift, turn, turn, radius, material)
     if placements is None or table is None:
-        return own, InstanceTable.concatenate([_single(triangles), columns])
-    pairs = [[getattr(each, name) for each in (placements, own)] for name in PLACEMENT]
+        return curved, InstanceTable.concatenate([_single(triangles), columns])
+    pairs = [[getattr(group, name) for group in (placements, curved)] for name in PLACEMENT]
     joined = Placements(*(np.concatenate(pair, -1) for pair in pairs))
     return joined, InstanceTable.concatenate([table, columns])
 

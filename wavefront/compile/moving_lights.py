@@ -56,18 +56,18 @@ def moving_parts(
     groups += motion.deformation_of(first)
     for deforming, lanes in groups:
         if lanes.size:
-            part, row = record.take(lanes), first.take(lanes)
+            lights, row = record.take(lanes), first.take(lanes)
             if deforming is not None:
-                part = _deforming(part, row, deforming)
+                lights = _deforming(lights, row, deforming)
             assert motion.motions is not None
             number = motion.mover.take(column.take(lanes))
-            yield MovingLights(part, number, motion.motions, type(part)), rows[..., lanes]
+            yield MovingLights(lights, number, motion.motions, type(lights)), rows[..., lanes]
 
 
 def _deforming(record: LightRecord, row: Ints, mesh: DeformingRows) -> DeformingLights:
     """Return emitting triangles of a mesh that deforms, by their rows (k,) in the scene's tables."""
     corners: Floats = np.concatenate(
-        [each.take(row - mesh.first, 0).reshape(-1, 9).T for each in mesh.corners]
+        [corners.take(row - mesh.first, 0).reshape(-1, 9).T for corners in mesh.corners]
     )
     times = tuple(mesh.times.tolist())
     return DeformingLights(record, np.ascontiguousarray(corners), times, type(record))
