@@ -71,8 +71,8 @@ def from_open3d(data: Any, *, smooth: bool | float | str = AUTO) -> Scene:
     points = np.asarray(data.points, np.float64).reshape(-1, 3)
     if hasattr(data, "lines"):
         segments = np.asarray(data.lines, np.intp).reshape(-1, 2)
-        found = _of_each(segments, getattr(data, "colors", ()))
-        return Scene([capsules(name, points, segments, _linear(found))])
+        colors = _of_each(segments, getattr(data, "colors", ()))
+        return Scene([capsules(name, points, segments, _linear(colors))])
     return Scene(spheres(name, points, _linear(_of_each(points, getattr(data, "colors", ())))))
 
 
@@ -108,10 +108,10 @@ def built(raw: RawMesh, smooth: bool | float | str) -> list[Shape]:
 def spheres(name: str, points: Table, colors: Any) -> list[Shape]:
     """Return a sphere at each point (n, 3), with linear colors (n, 4)."""
     with Losses(name) as losses:
-        found = cloud(losses, points, colors)
-    if found is None:
+        shape = cloud(losses, points, colors)
+    if shape is None:
         raise SceneError(f"{name}: has no points")
-    return [found]
+    return [shape]
 
 
 def capsules(name: str, points: Table, segments: Any, colors: Any) -> Capsules:

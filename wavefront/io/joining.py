@@ -26,8 +26,8 @@ def join(
 ) -> Mesh:
     """Return one mesh with the triangles of all meshes.
 
-    Where only some of them have normals, the others get those of their facets. What else only some have per
-    vertex is left out; the render warns of what a material reads.
+    Where only some of them have normals, the others get those of their facets. Other values per vertex
+    that only some meshes have are left out; the render warns if a material reads them.
 
     Raises
     ------
@@ -40,8 +40,8 @@ def join(
     if np.linalg.det(matrix) == 0:
         raise SceneError("transform is singular; it must be invertible")
     if any(mesh.normals is not None for mesh in meshes):
-        for each in meshes:
-            each.keep_facets()
+        for faceted in meshes:
+            faceted.keep_facets()
     raw = moved_raw(stacked(name, meshes), matrix)
     raw.material = meshes[0].material if material is None else as_material("material", material)
     if material is None:
@@ -55,15 +55,15 @@ def join(
     return mesh
 
 
-def stacked(name: str, parts: Sequence[Mesh | RawMesh]) -> RawMesh:
+def stacked(name: str, meshes: Sequence[Mesh | RawMesh]) -> RawMesh:
     """Return one mesh with the triangles of all, and what all of them have per vertex."""
-    starts = np.cumsum([0] + [len(part.vertices) for part in parts])
-    faces = np.concatenate([part.faces + start for part, start in zip(parts, starts[:-1], strict=True)])
-    columns = {each: _joined([getattr(part, each) for part in parts]) for each in COLUMNS}
+    starts = np.cumsum([0] + [len(mesh.vertices) for mesh in meshes])
+    faces = np.concatenate([mesh.faces + start for mesh, start in zip(meshes, starts[:-1], strict=True)])
+    columns = {column: _joined([getattr(mesh, column) for mesh in meshes]) for column in COLUMNS}
     return RawMesh(name, faces=faces, **columns)  # type: ignore[arg-type]
 
 
-def _joined(parts: list[Doubles | None]) -> Doubles | None:
-    """Concatenate an array if every part has it."""
-    there = [part for part in parts if part is not None]
-    return np.concatenate(there) if len(there) == len(parts) else None
+def _joined(columns: list[Doubles | None]) -> Doubles | None:
+    """Return the columns of several meshes as one; None if a mesh lacks it."""
+    arrays = [array for array in columns if array is not None]
+    return np.concatenate(arrays) if len(arrays) == len(columns) else None

@@ -106,7 +106,7 @@ def load(
             at = partial(_read_at, path, options)
             scene.file_moments = FileMoments(at, contents.span, scene)
         if not os.fspath(path).lower().endswith(ALL_OF_THE_LIGHT):
-            scene.lights_of_file = [id(each) for each in scene.lights]
+            scene.lights_of_file = [id(light) for light in scene.lights]
         return scene
 
 

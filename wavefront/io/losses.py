@@ -94,7 +94,7 @@ class Losses:
 
         The arguments are those of `note`; several places with the same part count as one.
         """
-        if not self.strict and all((each.part, each.done) != (part, done) for each in self._notices):
+        if not self.strict and all((loss.part, loss.done) != (part, done) for loss in self._notices):
             self._notices[Loss(f"{self.name}: {place}", part, done=done)] = None
 
     def hear(self, message: str) -> None:
@@ -123,10 +123,10 @@ class Losses:
         self, part: str, value: ArrayLike, low: float = 0.0, high: float = 1.0, place: str = ""
     ) -> Doubles:
         """Return numbers clamped to a range, which is noted: files are often outside of it by rounding."""
-        given = np.asarray(value, np.float64)
-        limited = np.clip(given, low, high)
-        if (limited != given).any():
-            self.note(part, place, _text(given), f"clamped to {_text(limited)}")
+        numbers = np.asarray(value, np.float64)
+        limited = np.clip(numbers, low, high)
+        if (limited != numbers).any():
+            self.note(part, place, _text(numbers), f"clamped to {_text(limited)}")
         return limited
 
     def take(self, losses: Iterable[Loss], notices: Iterable[Loss] = ()) -> None:
@@ -170,7 +170,7 @@ class Losses:
         return "\n  ".join([head, *lines[:MOST_SHOWN], *more])
 
     def _lines(self) -> list[str]:
-        """Return what was noted as text; the same at several places is one line with their number."""
+        """Return the losses as lines of text; one loss at several places is one line, with their number."""
         alike: dict[tuple[str, str, str], list[Loss]] = {}
         for loss in (*self._noted, *self._notices):
             alike.setdefault((loss.part, loss.value, loss.done), []).append(loss)

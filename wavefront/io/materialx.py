@@ -220,7 +220,7 @@ def _materials(files: SceneFiles) -> dict[str, Material]:
     except (RuntimeError, TypeError, UnicodeDecodeError, LookupError) as error:  # of the library
         raise SceneError(f"{name}: not a readable MaterialX document: {error}") from error
     if not materials:
-        lost = [each.part for each in files.losses.found]
+        lost = [loss.part for loss in files.losses.found]
         raise SceneError(f"{name}: has no materials{'; not followed: ' * bool(lost)}{'; '.join(lost)}")
     return materials
 
@@ -280,7 +280,10 @@ class _Document:
             return OpenPBR(name=title)
         if node.getInput("displacementshader") is not None:
             self._lose(title, "displacementshader", "displacement")
-        inputs = {each.getName(): self._input(title, shader, each) for each in definition.getActiveInputs()}
+        inputs = {
+            declared.getName(): self._input(title, shader, declared)
+            for declared in definition.getActiveInputs()
+        }
         return self._made(title, TRANSLATIONS[kind](self, title, inputs))
 
     def _made(self, title: str, inputs: dict[str, Value]) -> Material:
@@ -288,30 +291,30 @@ class _Document:
             value = inputs.pop(name, None)
             if value is not None and np.any(np.not_equal(value, 0)):
                 self._lose(title, name, "")
-        given = {name: value for name, value in inputs.items() if value is not None}
+        values = {name: value for name, value in inputs.items() if value is not None}
         for name in WITHOUT_EFFECT:
-            given.pop(name, None)
-        if not isinstance(given.get("geometry_normal"), NormalMap):
-            given.pop("geometry_normal", None)
-        if not isinstance(given["specular_ior"], BaseTexture):  # 0 is allowed there
-            given["specular_ior"] = max(float(given["specular_ior"]), LEAST_INDEX)
-        if "geometry_thin_walled" in given:
-            given["geometry_thin_walled"] = bool(given["geometry_thin_walled"])
+            values.pop(name, None)
+        if not isinstance(values.get("geometry_normal"), NormalMap):
+            values.pop("geometry_normal", None)
+        if not isinstance(values["specular_ior"], BaseTexture):  # 0 is allowed there
+            values["specular_ior"] = max(float(values["specular_ior"]), LEAST_INDEX)
+        if "geometry_thin_walled" in values:
+            values["geometry_thin_walled"] = bool(values["geometry_thin_walled"])
         with hear_warnings(lambda message: self.files.losses.note(message, title, done="")):
             try:
-                return OpenPBR(**given, name=title)
+                return OpenPBR(**values, name=title)
             except SceneError:
-                return self._without_wrong(title, given)
+                return self._without_wrong(title, values)
 
-    def _without_wrong(self, title: str, given: dict[str, Any]) -> Material:
+    def _without_wrong(self, title: str, values: dict[str, Any]) -> Material:
         """Return a material of those inputs that each have a value that it can have."""
-        kept: dict[str, Any] = {}
-        for name, value in given.items():
+        sound: dict[str, Any] = {}
+        for name, value in values.items():
             with self.files.losses.part(f"material {title!r}", f"the default of {name} in its place"):
                 OpenPBR(**{name: value})
-                kept[name] = value
+                sound[name] = value
         try:
-            return OpenPBR(**kept, name=title)
+            return OpenPBR(**sound, name=title)
         except SceneError as error:  # of values together
             raise SceneError(f"{self.name}: material {title!r}: {error}") from error
 
@@ -378,30 +381,30 @@ class _Document:
 
     def _input(self, title: str, shader: Any, declared: Any) -> Value:
         """Return the value of an input of a shader, by default the declared one; None if it has none."""
-        default, given = _plain(declared), shader.getInput(declared.getName())
-        if given is None:
+        default, port = _plain(declared), shader.getInput(declared.getName())
+        if port is None:
             return default
         try:
-            return self._value(given, declared.getType(), {}, 0)
+            return self._value(port, declared.getType(), {}, 0)
         except Lost as error:
             self._lose(title, declared.getName(), str(error))
             return default
 
-    def _value(self, given: Any, kind: str, interface: dict[str, Value], depth: int) -> Value:
+    def _value(self, port: Any, kind: str, interface: dict[str, Value], depth: int) -> Value:
         """Return the value of an input: of a node, of the interface of its graph, or its own."""
         if depth > MAX_LINKS:
             raise Lost("nodes that lead to each other")
-        if given.getInterfaceName() in interface:
-            return interface[given.getInterfaceName()]
-        if given.getInterfaceName() and (source := given.getInterfaceInput()) is not None:
-            return self._value(source, kind, interface, depth + 1)
-        node = given.getConnectedNode()
+        if port.getInterfaceName() in interface:
+            return interface[port.getInterfaceName()]
+        if port.getInterfaceName() and (outer := port.getInterfaceInput()) is not None:
+            return self._value(outer, kind, interface, depth + 1)
+        node = port.getConnectedNode()
         if node is not None:
-            source = given if given.getNodeName() else given.getConnectedOutput()
-            return self._node(node, source.getOutputString(), interface, depth + 1, kind)
-        if given.getNodeName() or given.getNodeGraphString() or given.getOutputString():
+            outer = port if port.getNodeName() else port.getConnectedOutput()
+            return self._node(node, outer.getOutputString(), interface, depth + 1, kind)
+        if port.getNodeName() or port.getNodeGraphString() or port.getOutputString():
             raise Lost("a node that does not exist")
-        if (value := _plain(given)) is None:
+        if (value := _plain(port)) is None:
             raise Lost("an input without a value")
         return value
 
@@ -416,13 +419,13 @@ class _Document:
         named = f"{category} {node.getName()!r}"
 
         def value(name: str) -> Value:
-            given, definition = node.getInput(name), node.getNodeDef()
+            port, definition = node.getInput(name), node.getNodeDef()
             declared = None if definition is None else definition.getActiveInput(name)
-            if given is None and declared is None:
+            if port is None and declared is None:
                 raise Lost(f"{named} without {name!r}")
-            if given is None:
+            if port is None:
                 return _plain(declared)
-            return self._value(given, given.getType(), interface, depth)
+            return self._value(port, port.getType(), interface, depth)
 
         try:
             if category in FUNCTIONS:
@@ -467,7 +470,7 @@ class _Document:
         (u, v), (du, dv) = (value("uvtiling"), value("uvoffset")) if tiled else ((1, 1), (0, 0))
         transform = None if (u, v, du, dv) == (1, 1, 0, 0) else [[u, 0, -du], [0, v, -dv], [0, 0, 1]]
         modes = [node.getInput(name) for name in ("uaddressmode", "vaddressmode")]
-        wraps = [WRAPS.get("periodic" if each is None else each.getValueString()) for each in modes]
+        wraps = [WRAPS.get("periodic" if mode is None else mode.getValueString()) for mode in modes]
         if None in wraps:
             raise Lost(f"image {node.getName()!r} with a constant outside")
         closest = (mode := node.getInput("filtertype")) is not None and mode.getValueString() == "closest"
@@ -492,14 +495,14 @@ class _Document:
         self.files.losses.note(f"{name}{f' by {what}' if what else ''}", material)
 
 
-def _plain(given: Any) -> Value:
+def _plain(port: Any) -> Value:
     """Return the constant of an input: a number, a text, or a tuple of numbers; None if it has none."""
-    value = given.getValue()
+    value = port.getValue()
     if value is None or isinstance(value, str | bool | int | float):
-        if given.getType() in ("float", "color3") and not isinstance(value, float | None):
-            raise Lost(f"a {given.getType()} that is {value!r}")
+        if port.getType() in ("float", "color3") and not isinstance(value, float | None):
+            raise Lost(f"a {port.getType()} that is {value!r}")
         return value
-    return tuple(float(each) for each in value)
+    return tuple(float(component) for component in value)
 
 
 def _number(value: Value) -> Any:
@@ -511,9 +514,11 @@ def _number(value: Value) -> Any:
 
 def _combined(function: Callable[..., Any], parts: list[Value]) -> Value:
     """Return a function of numbers, colors and textures."""
-    textures = [part for part in parts if isinstance(part, BaseTexture)]
-    known = [part if isinstance(part, BaseTexture) else np.asarray(part, f4) for part in parts]
-    ones = all(np.all(part == 1) for part in known if not isinstance(part, BaseTexture))
+    textures = [argument for argument in parts if isinstance(argument, BaseTexture)]
+    known = [
+        argument if isinstance(argument, BaseTexture) else np.asarray(argument, f4) for argument in parts
+    ]
+    ones = all(np.all(argument == 1) for argument in known if not isinstance(argument, BaseTexture))
     if function is operator.mul and len(textures) == 1 and ones:  # a texture keeps what is known of it
         return textures[0]
     return parts[0] if function is _same else computed(function, *known, rising=False)

@@ -53,30 +53,30 @@ from .sources import SceneFiles
 
 def libraries(files: SceneFiles, lines: Iterable[str]) -> dict[str, MaterialSpec]:
     """Read the material files that lines of a file name; missing ones are noted."""
-    found: dict[str, MaterialSpec] = {}
+    materials: dict[str, MaterialSpec] = {}
     names = (name for line in lines for name in _names(files, line))
     for library in dict.fromkeys(names):
         try:
             file = files.find(library)
-            there = os.path.exists(file)  # also False for invalid names
+            exists = os.path.exists(file)  # also False for invalid names
         except SceneError as error:
             if passed_limit(error):
                 raise
             files.losses.note(f"material file {library!r}: {files.brief(error)}", done=LEFT_OUT)
             continue
-        if not there:
+        if not exists:
             files.losses.note(f"material file {library!r}", value="missing", done=LEFT_OUT)
             continue
-        found.update(specs(parse(file, decode_text(files.read(file)), files.losses, files), files.losses))
-    return found
+        materials.update(specs(parse(file, decode_text(files.read(file)), files.losses, files), files.losses))
+    return materials
 
 
 def _names(files: SceneFiles, line: str) -> list[str]:
     """Return the material files of a line: one, whose name may contain blanks or be quoted, or several."""
     line = line.strip('"')
     beside = os.path.join(os.path.dirname(files.name), line)
-    parts = re.split(r"(?<=\.mtl)\s+", line.strip(), flags=re.IGNORECASE)  # in linear time
-    several = [part for part in parts if part.lower().endswith(".mtl")]
+    names = re.split(r"(?<=\.mtl)\s+", line.strip(), flags=re.IGNORECASE)  # in linear time
+    several = [name for name in names if name.lower().endswith(".mtl")]
     return several if len(several) > 1 and not os.path.exists(beside) else [line]
 
 

@@ -117,7 +117,7 @@ def parse(losses: Losses, text: str, limits: LoadLimits | None = None) -> Obj:
             if width > 6 and keyword == "v":
                 out.ignored.setdefault("numbers of v after the sixth", at + 1)
         else:
-            keyword, _, rest = (part.strip() for part in texts[at].partition(" "))
+            keyword, _, rest = (word.strip() for word in texts[at].partition(" "))
             if keyword == "usemtl":
                 material = rest
             elif keyword == "mtllib":
@@ -134,15 +134,15 @@ def parse(losses: Losses, text: str, limits: LoadLimits | None = None) -> Obj:
     added, classes = _faces(lines)
     if not classes:
         return out
-    faces = [line for number, each in enumerate(classes) for line in (f"usemtl {number}", *each.faces)]
+    faces = [line for number, group in enumerate(classes) for line in (f"usemtl {number}", *group.faces)]
     meshes = geometries(losses.name, "obj", "\n".join(_tables(lines) + added + faces).encode())
     for keyword, at in lines.absent.items():
         losses.note(*lines.face(at), f"without {keyword}, as there is none")
     # trimesh lists the last mesh first
     raws = {
         raw.name: raw
-        for each, mesh in zip(classes, reversed(meshes), strict=True)
-        for raw in _raws(lines, each, mesh)
+        for group, mesh in zip(classes, reversed(meshes), strict=True)
+        for raw in _raws(lines, group, mesh)
     }
     out.raws = [raws[material] for material in lines.groups]
     if smooth and any(raw.normals is None or not raw.normals.any(axis=1).all() for raw in out.raws):
@@ -175,7 +175,7 @@ def _kind(number: int, line: str) -> Kind:
 
 
 def _mend(lines: _Lines, at: int) -> tuple[str, int]:
-    """Replace a damaged line, which is noted; return keyword and width of what stands for it."""
+    """Replace a damaged line, which is noted; return the keyword and the width of its replacement."""
     text, (keyword, width, _, fault) = lines.texts[at], lines.kinds[at]
     instead, done = INSTEAD.get(keyword, LEFT_OUT)
     if keyword == "v" and width and fault == "is too short":
@@ -247,14 +247,14 @@ def _rewritten(lines: _Lines, group: list[int]) -> tuple[list[int], list[str]]:
 
     Those with a v that does not exist are left out.
     """
-    found = {at: face for at in group if (face := _face(lines, at)) is not None}
-    faces = list(found.values())
+    by_line = {at: face for at in group if (face := _face(lines, at)) is not None}
+    faces = list(by_line.values())
     for column, (keyword, rows) in enumerate(lines.rows.items()):
         if any(corner[column] for face in faces for corner in face):
             for number, face in enumerate(faces, 1):
                 for corner in face:
                     corner[column] = corner[column] or len(rows) + (number if keyword == "vn" else 1)
-    return list(found), [
+    return list(by_line), [
         "f " + " ".join("/".join(str(i or "") for i in corner).rstrip("/") for corner in face)
         for face in faces
     ]

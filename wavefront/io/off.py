@@ -46,8 +46,8 @@ def parse(losses: Losses, data: bytes, materials: bool) -> list[RawMesh]:
 
 
 def _note_unread(losses: Losses, header: str, colored: bool, materials: bool) -> None:
-    for each in [*HEADERS[header], *["colors of faces"] * colored] if materials else ():
-        losses.note(each)
+    for unread in [*HEADERS[header], *["colors of faces"] * colored] if materials else ():
+        losses.note(unread)
 
 
 def _polygons(losses: Losses, vertex: Rows, face: Rows) -> RawMesh:

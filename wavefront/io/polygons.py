@@ -83,31 +83,31 @@ def triangulate(
     holes
         Numbers of polygons that are left out.
     """
-    corner, polygon = found = order(counts) if (counts > 3).any() else fans(counts)
+    corner, polygon = triangles = order(counts) if (counts > 3).any() else fans(counts)
     if holes is not None and len(holes):
         shown = ~np.isin(polygon, holes)
-        corner, polygon = found = Triangles(corner[shown], polygon[shown])
+        corner, polygon = triangles = Triangles(corner[shown], polygon[shown])
     with np.errstate(all="ignore"):
         rows = np.flatnonzero(_are_odd(points, corners, counts)[polygon])
         if not len(rows):
-            return found
-        part = polygon[rows]
+            return triangles
+        owner = polygon[rows]
         area, size = _areas(points, corners[corner[rows]])
-        normal: Doubles = np.stack([np.bincount(part, each, len(counts)) for each in area])
+        normal: Doubles = np.stack([np.bincount(owner, component, len(counts)) for component in area])
         whole = dot(normal, normal)
-        folded = dot(area, normal[:, part]) < -FOLD * size * np.sqrt(whole[part])
-        thin = (dot(area, area) <= (FLAT * size) ** 2) & (whole[part] > 0)
+        folded = dot(area, normal[:, owner]) < -FOLD * size * np.sqrt(whole[owner])
+        thin = (dot(area, area) <= (FLAT * size) ** 2) & (whole[owner] > 0)
         cut = [
-            _cut(points, corners, counts, normal, np.unique(part[folded])),
-            _broken(points, corners, counts, part),
+            _cut(points, corners, counts, normal, np.unique(owner[folded])),
+            _broken(points, corners, counts, owner),
         ]
-    kept = np.ones(len(corner), np.bool_)
-    kept[rows[thin]] = False
-    kept &= ~np.isin(polygon, np.concatenate([each.polygon for each in cut]))
-    if kept.all():
-        return found
-    parts = zip((corner[kept], polygon[kept]), *cut, strict=True)
-    return Triangles(*map(np.concatenate, parts))
+    keep = np.ones(len(corner), np.bool_)
+    keep[rows[thin]] = False
+    keep &= ~np.isin(polygon, np.concatenate([piece.polygon for piece in cut]))
+    if keep.all():
+        return triangles
+    lists = zip((corner[keep], polygon[keep]), *cut, strict=True)
+    return Triangles(*map(np.concatenate, lists))
 
 
 def with_holes(rings: list[Doubles]) -> Ints:
@@ -125,28 +125,28 @@ def with_holes(rings: list[Doubles]) -> Ints:
 
 
 def _are_odd(points: Doubles, corners: Ints, counts: Ints) -> Bools:
-    """Return which polygons (k,) have a triangle in their fan that is not clearly above 0."""
+    """Return a mask of the polygons (k,) whose fan has a triangle whose area is not clearly above 0."""
     odd, first = np.zeros(len(counts), np.bool_), np.cumsum(counts) - counts
     for size in distinct(counts[counts > 3]):
         chosen = np.flatnonzero(counts == size)
-        for part in spans(len(chosen), max(AT_ONCE // size, 1)):
-            own = chosen[part]
-            places = points.take(corners[first[own] + np.arange(size)[:, None]], 0)  # (n, k, 3)
+        for block in spans(len(chosen), max(AT_ONCE // size, 1)):
+            members = chosen[block]
+            places = points.take(corners[first[members] + np.arange(size)[:, None]], 0)  # (n, k, 3)
             side = np.ascontiguousarray((places[1:] - places[0]).transpose(2, 0, 1))
             area, square = cross(side[:, :-1], side[:, 1:]), dot(side, side)
             normal = area.sum(1)
             least = FOLD * np.sqrt(dot(normal, normal)) * (square[:-1] + square[1:])
-            odd[own] = ~((dot(area, normal[:, None]) > least) & (square[1:] < FLOAT32_MAX**2)).all(0)
+            odd[members] = ~((dot(area, normal[:, None]) > least) & (square[1:] < FLOAT32_MAX**2)).all(0)
     return odd
 
 
 def _areas(points: Doubles, triangles: Ints) -> tuple[Doubles, Doubles]:
     """Return twice the area of triangles (m, 3) as vectors (3, m), and the squares (m,) of their sides."""
     area, size = np.empty((3, len(triangles))), np.empty(len(triangles))
-    for part in spans(len(triangles), AT_ONCE):
-        a, b, c = np.ascontiguousarray(points.take(triangles[part], 0).transpose(1, 2, 0))
-        area[:, part] = cross(b - a, c - a)
-        size[part] = dot(b - a, b - a) + dot(c - a, c - a)
+    for block in spans(len(triangles), AT_ONCE):
+        a, b, c = np.ascontiguousarray(points.take(triangles[block], 0).transpose(1, 2, 0))
+        area[:, block] = cross(b - a, c - a)
+        size[block] = dot(b - a, b - a) + dot(c - a, c - a)
     return area, size
 
 
@@ -174,8 +174,8 @@ def _cut(points: Doubles, corners: Ints, counts: Ints, normal: Doubles, concave:
     sound = (dot(area, np.repeat(normal[:, quads], 2, 1)) > 0).reshape(-1, 2).all(1)
     corner, polygon = [halves[sound].reshape(-1, 3)], [np.repeat(quads[sound], 2)]
     for number in concave[counts[concave] > 4].tolist():
-        own = np.arange(first[number], first[number] + counts[number])
-        corner.append(own[_ears(points[corners[own]], normal[:, number])])
+        ring = np.arange(first[number], first[number] + counts[number])
+        corner.append(ring[_ears(points[corners[ring]], normal[:, number])])
         polygon.append(np.full(len(corner[-1]), number))
     return Triangles(np.concatenate(corner), np.concatenate(polygon))
 
@@ -193,5 +193,5 @@ def _ears(points: Doubles, normal: Doubles, ends: Ints | None = None) -> Ints:
     if not 0 < scale < np.inf or len(points) > MOST:
         return np.zeros((0, 3), np.intp)
     ends = np.array([len(points)]) if ends is None else ends
-    found = triangulate_float64(np.ascontiguousarray(seen / scale), ends.astype(np.uint32))
-    return found.astype(np.intp).reshape(-1, 3)
+    triangles = triangulate_float64(np.ascontiguousarray(seen / scale), ends.astype(np.uint32))
+    return triangles.astype(np.intp).reshape(-1, 3)

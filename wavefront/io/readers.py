@@ -167,15 +167,17 @@ def mesh_reader(files: SceneFiles) -> Callable[[Path], list[RawMesh]]:
         kind = Path(path.name.removesuffix(".gz")).suffix.lower()
         if kind not in (".obj", ".ply"):
             raise SceneError(f"{path}: extension is {kind!r}; it must be .obj or .ply")
-        own, name = files.seen_from(path), os.fspath(path)
-        data = own.read(path)
+        local, name = files.seen_from(path), os.fspath(path)
+        data = local.read(path)
         _refuse(name, data)
         if kind == ".obj":
-            return _read_obj(own, data, LoadOptions(files.losses, materials=False, limits=files.limits)).raws
+            return _read_obj(
+                local, data, LoadOptions(files.losses, materials=False, limits=files.limits)
+            ).raws
         from .ply import meshes as ply
         from .ply.attributes import ply_attributes
 
-        parsed = ply.parse(own, data, materials=False)
+        parsed = ply.parse(local, data, materials=False)
         raws = parsed.contents.raws
         for raw in raws:
             raw.attributes = ply_attributes(parsed.rows, parsed.row)

@@ -82,10 +82,10 @@ def with_corners_apart(raw: RawMesh) -> RawMesh:
     Where there is no such vertex it is NaN, and `build` leaves the face out.
     """
     corners = raw.faces.ravel()
-    there = (corners >= 0) & (corners < len(raw.vertices))
-    if not there.all():
+    exists = (corners >= 0) & (corners < len(raw.vertices))
+    if not exists.all():
         raw = replace(raw, vertices=np.vstack([raw.vertices, np.full(3, np.nan)]))
-        corners = np.where(there, corners, len(raw.vertices) - 1)
+        corners = np.where(exists, corners, len(raw.vertices) - 1)
 
     def of_corners(values: Table | None) -> Table | None:
         return values[np.minimum(corners, len(values) - 1)] if values is not None and len(values) else None
@@ -117,15 +117,15 @@ def build(source: str, raw: RawMesh, losses: Losses) -> Mesh | None:
     label = _label(source, raw)
     vertices = np.asarray(raw.vertices, np.float64).reshape(-1, 3)
     faces = np.asarray(raw.faces).reshape(-1, 3).astype(np.intp)
-    there = existing(losses, label, faces, len(vertices))
-    if not there.any():
+    exists = existing(losses, label, faces, len(vertices))
+    if not exists.any():
         return None
-    if not there.all():
-        faces = np.where(there[:, None], faces, 0)
+    if not exists.all():
+        faces = np.where(exists[:, None], faces, 0)
     sound = np.all(np.abs(vertices) <= FLOAT32_MAX, axis=1)  # false for NaN
     vertices = np.where(sound[:, None], vertices, 0.0)
-    keep: Bools = there & np.all(sound[faces], axis=1)
-    _note_faces(losses, label, raw, there & ~keep, "with a vertex that is not finite or beyond float32")
+    keep: Bools = exists & np.all(sound[faces], axis=1)
+    _note_faces(losses, label, raw, exists & ~keep, "with a vertex that is not finite or beyond float32")
     flat = keep & ~_has_area(vertices, faces) & (raw.deformation is None)  # others may be flat at times
     _note_faces(losses, label, raw, flat, "of zero area")
     faces = faces[keep & ~flat]
@@ -170,34 +170,34 @@ def existing(losses: Losses, label: str, faces: Faces, count: int) -> Bools:
     beyond = (faces < 0) | (faces >= count)
     i, j = np.argwhere(beyond)[0]
     first = f"face {i} uses vertex {faces[i, j]}; it must be in [0, {count - 1}]"
-    found = plural(int(beyond.any(1).sum()), "face")
-    losses.note(f"{found} with a vertex that does not exist, first: {first}", label, done="left out")
+    faces_beyond = plural(int(beyond.any(1).sum()), "face")
+    losses.note(f"{faces_beyond} with a vertex that does not exist, first: {first}", label, done="left out")
     return np.asarray(~beyond.any(1))
 
 
 def _note_faces(losses: Losses, label: str, raw: RawMesh, bad: Bools, what: str) -> None:
-    found = np.flatnonzero(bad)
-    if not len(found):
+    numbers = np.flatnonzero(bad)
+    if not len(numbers):
         return
-    first = f"face {found[0]}" if raw.lines is None else f"line {raw.lines[found[0]]}"
-    losses.note(f"{plural(len(found), 'face')} {what}, first: {first}", label, done="left out")
+    first = f"face {numbers[0]}" if raw.lines is None else f"line {raw.lines[numbers[0]]}"
+    losses.note(f"{plural(len(numbers), 'face')} {what}, first: {first}", label, done="left out")
 
 
 def _note_vertices(losses: Losses, label: str, bad: Any, what: str, state: str, done: str) -> None:
-    found = plural(int(bad.sum()), f"{what} is", f"{what}s are")
-    losses.note(f"{found} {state}, first: vertex {bad.argmax()}", label, done=done)
+    subject = plural(int(bad.sum()), f"{what} is", f"{what}s are")
+    losses.note(f"{subject} {state}, first: vertex {bad.argmax()}", label, done=done)
 
 
 def _has_area(vertices: Table, faces: Faces) -> Bools:
-    found = np.empty(len(faces), np.bool_)
-    for part in spans(len(faces), AT_ONCE):
-        a, b, c = np.ascontiguousarray(vertices.take(faces[part], 0).transpose(1, 2, 0))
+    has_area = np.empty(len(faces), np.bool_)
+    for block in spans(len(faces), AT_ONCE):
+        a, b, c = np.ascontiguousarray(vertices.take(faces[block], 0).transpose(1, 2, 0))
         edges = np.stack([b - a, c - b, a - c])  # (3, 3, m)
         longest = np.abs(edges).max(axis=(0, 1))
         # first divided by the longest edge, so that squares neither overflow nor underflow
         unit = edges / np.where(longest > 0, longest, 1)
-        found[part] = np.abs(cross(unit[0], unit[1])).max(axis=0) > FLAT
-    return found
+        has_area[block] = np.abs(cross(unit[0], unit[1])).max(axis=0) > FLAT
+    return has_area
 
 
 def _normals(
@@ -217,9 +217,9 @@ def _normals(
         corner = vertices[faces]
         scale = np.abs(corner).max()
         flat = np.cross((corner[:, 1] - corner[:, 0]) / scale, (corner[:, 2] - corner[:, 0]) / scale)
-        own = np.zeros_like(normals)
-        own[faces.ravel()] = np.repeat(flat, 3, axis=0)
-        normals[absent] = own[absent]
+        of_faces = np.zeros_like(normals)
+        of_faces[faces.ravel()] = np.repeat(flat, 3, axis=0)
+        normals[absent] = of_faces[absent]
         largest = np.abs(normals).max(axis=1)
     normals /= np.where(largest > 0, largest, 1)[:, None]
     size = np.sqrt((normals**2).sum(axis=1))

@@ -61,24 +61,24 @@ class Rows:
 
     def table(self, names: Iterable[str]) -> Doubles | None:
         """Return columns (count, k), None if one is missing."""
-        found = [self.columns.get(name) for name in names]
-        there = [_as(column, "f8") for column in found if column is not None]
-        return np.stack(there, 1) if len(there) == len(found) else None
+        columns = [self.columns.get(name) for name in names]
+        numbers = [_as(column, "f8") for column in columns if column is not None]
+        return np.stack(numbers, 1) if len(numbers) == len(columns) else None
 
     def units(self, names: Iterable[str]) -> Doubles | None:
         """Return the same, where the largest whole number of a type stands for 1.
 
         Larger types than two bytes often have bytes in them.
         """
-        kinds = {each.name: each.kind for each in self.element.properties}
-        found = self.table(names := tuple(names))
-        if found is None:
+        kinds = {prop.name: prop.kind for prop in self.element.properties}
+        table = self.table(names := tuple(names))
+        if table is None:
             return None
         for i, name in enumerate(names):
             if kinds[name][0] != "f":
-                byte = kinds[name] not in ("u1", "u2") and found[:, i].max(initial=0) <= 255
-                found[:, i] /= 255 if byte else np.iinfo(kinds[name]).max
-        return found
+                byte = kinds[name] not in ("u1", "u2") and table[:, i].max(initial=0) <= 255
+                table[:, i] /= 255 if byte else np.iinfo(kinds[name]).max
+        return table
 
 
 def rows_of_lines(element: Element, lines: list[list[str]]) -> Rows:
@@ -89,18 +89,18 @@ def rows_of_lines(element: Element, lines: list[list[str]]) -> Rows:
     at, bad = end - widths, np.zeros(len(lines), np.bool_)
     rows = Rows(element, len(lines), bad=bad)
     padded = np.append(values, np.nan)
-    for each in element.properties:
-        found = np.where(at < end, padded[np.minimum(at, len(values))], np.nan)
+    for prop in element.properties:
+        column = np.where(at < end, padded[np.minimum(at, len(values))], np.nan)
         bad |= at >= end
         at = at + 1
-        if each.length:
-            whole = (found >= 0) & (found <= end - at) & (found == np.rint(found))
-            counts = np.where(whole, found, 0).astype(np.intp)
+        if prop.length:
+            whole = (column >= 0) & (column <= end - at) & (column == np.rint(column))
+            counts = np.where(whole, column, 0).astype(np.intp)
             bad |= ~whole
-            rows.lists[each.name] = counts, values[ranges(at, counts)]
+            rows.lists[prop.name] = counts, values[ranges(at, counts)]
             at = at + counts
         else:
-            rows.columns[each.name] = _as(found, "f4") if each.kind == "f4" else found
+            rows.columns[prop.name] = _as(column, "f4") if prop.kind == "f4" else column
     rows.long = (at < end) & ~bad
     return rows
 
@@ -138,9 +138,9 @@ class Faces(NamedTuple):
 NONE = Faces(np.zeros((0, 3), np.intp), np.zeros(0, np.intp), np.zeros((0, 3), np.intp))
 
 
-def note_damage(losses: Losses, found: dict[str, Rows]) -> None:
+def note_damage(losses: Losses, elements: dict[str, Rows]) -> None:
     """Note rows that are missing or damaged."""
-    for name, rows in found.items():
+    for name, rows in elements.items():
         absent = rows.element.count - rows.count
         if absent and rows.element.properties:
             done = "missing, as the file ends before"
@@ -172,8 +172,8 @@ def faces_of_rows(losses: Losses, rows: Rows, named: str, points: Doubles) -> Fa
     lost[row[~inside]] = True
     note_rows(losses, rows, short & ~bad_rows(rows), "with fewer than 3 corners")
     note_rows(losses, rows, lost, f"with a vertex beyond the {len(points)}")
-    kept = np.flatnonzero(~(lost | short | bad_rows(rows)))
-    places = np.flatnonzero(np.isin(row, kept)) if len(kept) < rows.count else np.arange(len(row))
-    corner, polygon = triangulate(points, corners[places], counts[kept], fans_by_size)
+    sound = np.flatnonzero(~(lost | short | bad_rows(rows)))
+    places = np.flatnonzero(np.isin(row, sound)) if len(sound) < rows.count else np.arange(len(row))
+    corner, polygon = triangulate(points, corners[places], counts[sound], fans_by_size)
     corner = places[corner]
-    return Faces(corners[corner], kept[polygon], corner)
+    return Faces(corners[corner], sound[polygon], corner)

@@ -88,11 +88,11 @@ class LoadLimits:
     seconds: int = 600
 
     def __post_init__(self) -> None:
-        for each in fields(self):
-            value = getattr(self, each.name)
+        for limit in fields(self):
+            value = getattr(self, limit.name)
             if not isinstance(value, int | np.integer) or isinstance(value, bool) or value < 1:
                 raise SceneError(
-                    f"LoadLimits {each.name} is {value!r}; it must be a whole number of at least 1"
+                    f"LoadLimits {limit.name} is {value!r}; it must be a whole number of at least 1"
                 )
 
     def check_meshes(self, name: str, count: int) -> None:
@@ -176,11 +176,11 @@ class SceneFiles:
                 raise
             refused = error
         source, places, roots = self._places(base, folders)
-        found = elsewhere(source, reference, places, roots, self._listed)
-        if found is not None:
-            self._note_found(reference, source, found)
-            check_regular(found, self.limits.file_bytes)
-            return found
+        path = elsewhere(source, reference, places, roots, self._listed)
+        if path is not None:
+            self._note_found(reference, source, path)
+            check_regular(path, self.limits.file_bytes)
+            return path
         if refused is not None:
             raise refused
         return named
@@ -199,25 +199,25 @@ class SceneFiles:
             regular one.
         """
         allowed = followed(self.scene if base is None else base, reference, *self._places(base, folders)[1:])
-        found = next((path for path in allowed if os.path.exists(path)), None)
-        if found is not None:
-            check_regular(found, self.limits.file_bytes)
-        return found or allowed[0]
+        existing = next((path for path in allowed if os.path.exists(path)), None)
+        if existing is not None:
+            check_regular(existing, self.limits.file_bytes)
+        return existing or allowed[0]
 
     def existing(self, reference: str, folders: Sequence[Path] | None = None) -> Path:
         """Return the path of a file that the scene refers to and that must be there; as `find` otherwise."""
-        found = self.find(reference, folders=folders)
-        if not os.path.exists(found):  # also False for invalid names
+        path = self.find(reference, folders=folders)
+        if not os.path.exists(path):  # also False for invalid names
             raise SceneError(f"file {reference!r} is missing")
-        return found
+        return path
 
     def _places(
         self, base: PathLike | None, folders: Sequence[Path] | None
     ) -> tuple[PathLike, list[Path], list[Path]]:
         """Return the file that refers to another one, where that is looked for, and where it must be."""
         source = self.scene if base is None else base
-        roots = [_folder(self.scene), *(each.resolve() for each in self.search_paths)]
-        first = [_folder(source)] if folders is None else [each.resolve() for each in folders]
+        roots = [_folder(self.scene), *(folder.resolve() for folder in self.search_paths)]
+        first = [_folder(source)] if folders is None else [folder.resolve() for folder in folders]
         return source, [*first, *roots[1:]], roots
 
     def _note_found(self, reference: str, source: PathLike, found: Path) -> None:
@@ -274,7 +274,7 @@ class SceneFiles:
         return instead
 
     def brief(self, error: SceneError) -> str:
-        """Return what an error says, without the folder of the scene."""
+        """Return the message of an error, without the folder of the scene."""
         folder = os.path.join(os.path.dirname(self.name), "")
         return str(error).replace(folder, "") if folder else str(error)
 
@@ -353,8 +353,8 @@ def folders(search_paths: PathLike | Iterable[PathLike]) -> tuple[Path, ...]:
     """
     if isinstance(search_paths, str | os.PathLike):
         search_paths = (search_paths,)
-    found = tuple(Path(path_name(each)) for each in search_paths)
-    for each in found:
-        if not each.is_dir():
-            raise SceneError(f"search_paths: {each} is not a folder")
-    return found
+    paths = tuple(Path(path_name(path)) for path in search_paths)
+    for path in paths:
+        if not path.is_dir():
+            raise SceneError(f"search_paths: {path} is not a folder")
+    return paths

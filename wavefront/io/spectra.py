@@ -58,22 +58,22 @@ polypropylene 1.49, bk7 1.5046, sodium chloride 1.544, amber 1.55, pet 1.575, di
 """
 INDICES = {
     name.strip(): float(index)
-    for name, _, index in (each.strip().rpartition(" ") for each in _INDICES.split(","))
+    for name, _, index in (pair.strip().rpartition(" ") for pair in _INDICES.split(","))
 }
 
 
 def pairs_of(name: str, value: Any) -> float | list[tuple[float, float]]:
     """Return a number, or wavelengths with values, of a text such as "400:0.1, 700:0.8" or of a list."""
     if not isinstance(value, str):
-        given = as_array(name, value)
-        return number(name, value) if given.ndim == 0 else list(finite_array(name, value, (None, 2)))
-    parts = value.replace(",", " ").split()
-    if len(parts) == 1 and ":" not in value:
+        array = as_array(name, value)
+        return number(name, value) if array.ndim == 0 else list(finite_array(name, value, (None, 2)))
+    words = value.replace(",", " ").split()
+    if len(words) == 1 and ":" not in value:
         return numbers("spectrum", name, value, (1,))[0]
-    pairs = [part.split(":") for part in parts]
+    pairs = [word.split(":") for word in words]
     if any(len(pair) != 2 for pair in pairs):
         raise SceneError(f"{name} is {in_brief(value)}; it must be a number, or wavelength:value pairs")
-    return [(numbers("", name, at, (1,))[0], numbers("", name, found, (1,))[0]) for at, found in pairs]
+    return [(numbers("", name, at, (1,))[0], numbers("", name, level, (1,))[0]) for at, level in pairs]
 
 
 def read_spectrum(path: Path, data: bytes) -> list[tuple[float, float]]:

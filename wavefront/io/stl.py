@@ -39,13 +39,13 @@ def parse(losses: Losses, data: bytes) -> list[RawMesh]:
         return _text(losses, decode_text(data))
     if len(data) < START:
         raise SceneError(f"{losses.name}: has {plural(len(data), 'byte')}; a binary STL has at least {START}")
-    there, rest = divmod(len(data) - START, FACET)
+    available, rest = divmod(len(data) - START, FACET)
     if count and rest:
-        there = min(there, count)
+        available = min(available, count)
     if not exact:
         value = f"{count}, but the file has {plural(len(data), 'byte')}"
-        losses.note("the number of facets", value=value, done=f"{there} read")
-        data = data[:80] + there.to_bytes(4, "little") + data[START : START + FACET * there]
+        losses.note("the number of facets", value=value, done=f"{available} read")
+        data = data[:80] + available.to_bytes(4, "little") + data[START : START + FACET * available]
     return _binary(losses, data)
 
 
@@ -61,8 +61,8 @@ def _binary(losses: Losses, data: bytes) -> list[RawMesh]:
         extra = mesh["face_attributes"]["stl"]
         if extra.any():
             colored.append(f"colors of facets (facet {int((extra != 0).argmax())})")
-    for each in colored:
-        losses.note(each)
+    for name in colored:
+        losses.note(name)
     return [RawMesh("", wide(mesh["vertices"]), mesh["faces"].astype(np.intp)) for mesh in meshes]
 
 

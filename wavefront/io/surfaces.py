@@ -26,19 +26,22 @@ def over_square(
     `point` returns positions and normals (n, 3) for u and v (n,). Faces without an area are left out.
     """
     u, v = (
-        each.ravel() for each in np.meshgrid(np.arange(columns + 1) / columns, np.arange(rows + 1) / rows)
+        grid.ravel() for grid in np.meshgrid(np.arange(columns + 1) / columns, np.arange(rows + 1) / rows)
     )
     vertices, normals = point(u, v)
     corner = (np.arange(rows)[:, None] * (columns + 1) + np.arange(columns)).ravel()
     above = corner + columns + 1
     faces = np.stack([corner, corner + 1, above + 1, corner, above + 1, above], 1).reshape(-1, 3)
     a, b, c = (vertices[faces[:, i]] for i in range(3))
-    kept = np.linalg.norm(np.cross(b - a, c - a), axis=1) > 1e-12 * np.square(np.abs(vertices).max())
-    return RawMesh(name, vertices, faces[kept], normals, np.stack([u, v], 1))
+    has_area = np.linalg.norm(np.cross(b - a, c - a), axis=1) > 1e-12 * np.square(np.abs(vertices).max())
+    return RawMesh(name, vertices, faces[has_area], normals, np.stack([u, v], 1))
 
 
 def revolved(name: str, strips: Sequence[Strip]) -> RawMesh:
-    """Return what strips of a profile make that turn about z; they rise where their front is outside."""
+    """Return the surface of revolution about z of the strips of a profile.
+
+    A strip that rises has its front outside.
+    """
     return stacked(name, [_turned(name, *strip) for strip in strips])
 
 
@@ -95,7 +98,7 @@ def as_meshes(shapes: Sequence[Shape], name: str, losses: Losses) -> list[Shape]
 
 def _pipes(shape: Cylinders) -> list[RawMesh]:
     radii = np.broadcast_to(shape.radii, shape.count).tolist()
-    return [_pipe(*each) for each in zip(shape.starts, shape.ends, radii, strict=True)]
+    return [_pipe(*cylinder) for cylinder in zip(shape.starts, shape.ends, radii, strict=True)]
 
 
 def ball(sphere: Sphere, turn: Doubles | None = None) -> RawMesh:

@@ -17,7 +17,7 @@ NUMBER = re.compile(r"[-+]?((\d+(\.\d*)?|\.\d+)(e[-+]?\d+)?|inf|infinity|nan)", 
 
 
 def words(line: str) -> list[str]:
-    """Return what blanks separate; other white space is part of the words."""
+    """Return the words of a line, which blanks separate; other white space is part of a word."""
     return [word for word in line.split(" ") if word]
 
 
@@ -42,14 +42,14 @@ def check_lines(lines: list[str], check: Callable[[int, str], Result]) -> list[R
 def numbers(place: str, name: str, text: str, counts: Collection[int]) -> list[float]:
     """Return the numbers of a text, of which there must be one of some counts."""
     try:
-        found = [float(each) for each in re.split(r"[\s,]+", text.strip(" \t\r\n,"))]
+        values = [float(word) for word in re.split(r"[\s,]+", text.strip(" \t\r\n,"))]
     except ValueError:
-        found = []
-    if len(found) not in counts or not np.isfinite(found).all():
+        values = []
+    if len(values) not in counts or not np.isfinite(values).all():
         counts = () if isinstance(counts, range) else counts
         wanted = (
             " or ".join("a number" if count == 1 else f"{count} numbers" for count in counts)
             or "a list of numbers"
         )
         raise SceneError(f"{place}: {name} is {in_brief(text)}; it must be {wanted}")
-    return found
+    return values

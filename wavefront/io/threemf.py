@@ -56,8 +56,8 @@ def parse(files: SceneFiles, data: bytes, materials: bool) -> Contents:
         of.append(numbers.setdefault(key, len(numbers)))
         matrices.append(matrix)
     raws = [package.raw(key, materials) for key in numbers]
-    for each in package.lost if materials else ():
-        files.losses.note(each)
+    for unread in package.lost if materials else ():
+        files.losses.note(unread)
     places = Places(np.array(of, np.intp), np.array(matrices).reshape(-1, 4, 4))
     places.scale(package.unit)
     return Contents(raws, places, up="z")
@@ -72,10 +72,13 @@ def _models(files: SceneFiles, data: bytes) -> dict[str, bytearray]:
             size = sum(member.file_size for member in members)
             if size > most:
                 raise LimitError(f"unpacks to {size} bytes; the limit is {most} (LoadLimits.unpacked_bytes)")
-            root = next((each for each in members if ROOT in each.filename.lower()), None)
+            root = next((member for member in members if ROOT in member.filename.lower()), None)
             if root is None:
                 raise SceneError(f"has no member {ROOT!r}")
-            read = [root, *(each for each in members if each is not root and _is_model(each.filename))]
+            read = [
+                root,
+                *(member for member in members if member is not root and _is_model(member.filename)),
+            ]
             for member in read:
                 files.budget.charge(f"its member {member.filename!r}", XML_BYTES * member.file_size)
             return {member.filename: unpacked(archive, member) for member in read}
@@ -118,21 +121,21 @@ class _Package:
         root = next(iter(models))
         for member, content in models.items():
             _Model(self, member, member == root).read(content)
-        for key, each in self._objects.items():
-            each.components = [part for part in each.components if self._exists(part[0], key)]
+        for key, body in self._objects.items():
+            body.components = [component for component in body.components if self._exists(component[0], key)]
         self._items = [item for item in self._items if self._exists(item[0], "build")]
 
     @property
     def children(self) -> dict[str, list[str]]:
         """The objects that each object holds, and "build" the items."""
-        out = {key: [child for child, _ in each.components] for key, each in self._objects.items()}
+        out = {key: [child for child, _ in body.components] for key, body in self._objects.items()}
         return {**out, "build": [child for child, _ in self._items]}
 
     def key(self, member: str, attributes: dict[str, str]) -> str:
         """Return the key of the object that an element of a member refers to."""
         path = attributes.get("path", "").strip("/")
-        found = self._members.get(path.lower(), path) if path else member
-        return f"{found}#{attributes.get('objectid', '')}"
+        target = self._members.get(path.lower(), path) if path else member
+        return f"{target}#{attributes.get('objectid', '')}"
 
     def placed(self) -> list[tuple[str, Matrix]]:
         """Return the meshes that are built, with their matrices to the scene."""
@@ -141,39 +144,39 @@ class _Package:
         with np.errstate(all="ignore"):  # a matrix that is not finite is reported where it is used
             while waiting:
                 key, matrix = waiting.pop()
-                each = self._objects[key]
+                body = self._objects[key]
                 if not in_range(matrix[None]).all():
                     self.losses.note(
                         f"the matrix of object {key}", value="beyond all limits", done="left out"
                     )
                     continue
-                if each.corners:
+                if body.corners:
                     out.append((key, matrix))
-                waiting += [(child, matrix @ inner) for child, inner in reversed(each.components)]
+                waiting += [(child, matrix @ inner) for child, inner in reversed(body.components)]
         return out
 
     def raw(self, key: str, materials: bool) -> RawMesh:
         """Return the mesh of an object; corners of several colors become vertices of their own."""
-        each = self._objects[key]
-        vertices, corners = np.array(each.vertices).reshape(-1, 3), np.array(each.corners, np.intp)
+        body = self._objects[key]
+        vertices, corners = np.array(body.vertices).reshape(-1, 3), np.array(body.corners, np.intp)
         faces = corners.reshape(-1, 3)
         sound = ((faces >= 0) & (faces < len(vertices))).all(1)
-        raw = RawMesh(each.name, vertices, faces[sound])
+        raw = RawMesh(body.name, vertices, faces[sound])
         if not sound.all():
             lost = plural(int((~sound).sum()), "triangle")
             what = f"{lost} with a vertex beyond the {len(vertices)}, first: triangle {sound.argmin()}"
             self.losses.note(what, f"object {key}", done="left out")
         member = key.partition("#")[0]
-        if not materials or not (each.paint or each.color):
+        if not materials or not (body.paint or body.color):
             return raw
-        group, index = each.color or ("", 0)
-        own = self._colors(member, group, np.array(index))
-        if not each.paint:
-            assign_material(raw, MaterialSpec(Material(Diffuse(own))))
+        group, index = body.color or ("", 0)
+        base_colors = self._colors(member, group, np.array(index))
+        if not body.paint:
+            assign_material(raw, MaterialSpec(Material(Diffuse(base_colors))))
             return raw
-        colors = np.tile(own, (len(faces), 3, 1))
-        paint = np.array(each.paint).reshape(-1, 5)
-        for group, number in each.groups.items():
+        colors = np.tile(base_colors, (len(faces), 3, 1))
+        paint = np.array(body.paint).reshape(-1, 5)
+        for group, number in body.groups.items():
             rows = paint[paint[:, 1] == number]
             colors[rows[:, 0]] = self._colors(member, group, rows[:, 2:])
         raw = with_corners_apart(raw)
@@ -261,16 +264,16 @@ class _Model:
             self._object.vertices.extend(self._number(attributes, axis) for axis in "xyz")
 
     def _triangle(self, tag: str, attributes: dict[str, str]) -> None:
-        each = self._object
-        if each is None:
+        body = self._object
+        if body is None:
             return
         if "p1" in attributes:
-            pid = attributes.get("pid", "" if each.color is None else each.color[0])
-            group = each.groups.setdefault(pid, len(each.groups))
+            pid = attributes.get("pid", "" if body.color is None else body.color[0])
+            group = body.groups.setdefault(pid, len(body.groups))
             first = self._whole(attributes, "p1", -1)
             numbers = [first, *(self._whole(attributes, name, first) for name in ("p2", "p3"))]
-            each.paint.extend((len(each.corners) // 3, group, *numbers))
-        each.corners.extend(self._whole(attributes, name) for name in ("v1", "v2", "v3"))
+            body.paint.extend((len(body.corners) // 3, group, *numbers))
+        body.corners.extend(self._whole(attributes, name) for name in ("v1", "v2", "v3"))
 
     def _component(self, tag: str, attributes: dict[str, str]) -> None:
         if self._object is not None:

@@ -36,7 +36,7 @@ def as_scene(
     reading: Mapping[str, Any] | None = None,
     coloring: Coloring | None = None,
 ) -> Scene:
-    """Return what `render` was given as a `Scene`.
+    """Return a `Scene` of the first argument of `render`.
 
     Parameters
     ----------
@@ -58,8 +58,8 @@ def as_scene(
     Raises
     ------
     SceneError
-        If it is nothing that can be rendered, or a list that contains itself, or the material or `smooth` is
-        meant for what has its own.
+        If it cannot be rendered, or is a list that contains itself; or if a material or `smooth` is given and
+        the subject has its own.
     """
     if material is not None:
         material = as_material("material", material)
@@ -101,12 +101,12 @@ def _with_scalars(
     reading: Mapping[str, Any] | None,
     coloring: Coloring,
 ) -> Scene:
-    """Return what `render` was given as a `Scene` whose shapes show numbers; arguments as of `as_scene`."""
+    """Return a `Scene` whose shapes show numbers, of the first argument of `render`; see `as_scene`."""
     if importer(subject) is _from_pyvista:
         from .pyvista.objects import from_pyvista
 
-        given = {"scalars": coloring.scalars, "cmap": coloring.cmap, "clim": coloring.clim}
-        return from_pyvista(subject, smooth=smooth, **given)
+        settings = {"scalars": coloring.scalars, "cmap": coloring.cmap, "clim": coloring.clim}
+        return from_pyvista(subject, smooth=smooth, **settings)
     if coloring.scalars is None:
         raise SceneError("cmap and clim are for scalars; give scalars=..., numbers or the name of some")
     if isinstance(subject, list | tuple) and not _is_mesh(subject):
@@ -120,8 +120,8 @@ def _with_scalars(
     if _is_mesh(subject):  # before vertices are split
         flat = with_scalars(_mesh_of(subject, None, AUTO), coloring)
         return as_scene(flat, None, progress, smooth, within, reading)
-    own = isinstance(subject, Shape | Scene)
-    scene = as_scene(subject, None, progress, AUTO if own else smooth, within, reading)
+    has_normals = isinstance(subject, Shape | Scene)
+    scene = as_scene(subject, None, progress, AUTO if has_normals else smooth, within, reading)
     if len(scene.shapes) != 1:
         raise SceneError(f"scalars are for one shape; there are {len(scene.shapes)}")
     shown = copy(scene)
@@ -176,9 +176,9 @@ COLORING = ("scalars", "cmap", "clim")  # settings
 
 
 def coloring_of(values: Mapping[str, Any]) -> Coloring | None:
-    """Return what the settings of `COLORING` say; None where none is given."""
-    given = [values.get(name) for name in COLORING]
-    return None if all(each is None for each in given) else Coloring(*given)
+    """Return the coloring of the settings in `COLORING`; None where none is given."""
+    settings = [values.get(name) for name in COLORING]
+    return None if all(setting is None for setting in settings) else Coloring(*settings)
 
 
 def framed(subject: Any, view: Any, fov: float | None, size: Any, up: Any) -> Camera:
@@ -193,7 +193,7 @@ def _is_mesh(subject: Any) -> bool:
     if not isinstance(subject, tuple | list) or len(subject) not in (2, 3):
         return False
     whole = isinstance(subject, tuple)  # also where one of them is empty, which the mesh says
-    return all(_is_table(part) or (whole and part == []) for part in subject)
+    return all(_is_table(element) or (whole and element == []) for element in subject)
 
 
 def _is_table(part: Any) -> bool:
@@ -203,7 +203,7 @@ def _is_table(part: Any) -> bool:
     row = part[0] if isinstance(part, list | tuple) and part else None
     if isinstance(row, np.ndarray):
         return row.ndim == 1
-    return isinstance(row, list | tuple) and all(isinstance(each, Real) for each in row)
+    return isinstance(row, list | tuple) and all(isinstance(cell, Real) for cell in row)
 
 
 def _mesh_of(parts: Sequence[Any], material: Material | None, smooth: bool | float | str) -> Mesh:
@@ -225,19 +225,19 @@ def _joined(
     within: tuple[int, ...],
 ) -> Scene:
     """Return one scene of all; the camera, and what is up, is the first that there is."""
-    lights = [item for item in subjects if isinstance(item, Light)]
-    bodies = (item for item in subjects if not isinstance(item, Light))
-    parts = [as_scene(item, material, progress, smooth, within) for item in bodies]
-    cameras = [part.camera for part in parts if part.camera is not None]
-    scene = Scene(
-        [shape for part in parts for shape in part.shapes],
-        [*lights, *(light for part in parts for light in part.lights)],
+    lights = [subject for subject in subjects if isinstance(subject, Light)]
+    bodies = (subject for subject in subjects if not isinstance(subject, Light))
+    scenes = [as_scene(subject, material, progress, smooth, within) for subject in bodies]
+    cameras = [scene.camera for scene in scenes if scene.camera is not None]
+    joined = Scene(
+        [shape for scene in scenes for shape in scene.shapes],
+        [*lights, *(light for scene in scenes for light in scene.lights)],
         cameras[0] if cameras else None,
-        up=next((part.up for part in parts if part.up is not None), None),
-        settings=next((part.settings for part in parts if part.settings), None),
+        up=next((scene.up for scene in scenes if scene.up is not None), None),
+        settings=next((scene.settings for scene in scenes if scene.settings), None),
     )
-    scene.losses = tuple(loss for part in parts for loss in part.losses)
-    return scene
+    joined.losses = tuple(loss for scene in scenes for loss in scene.losses)
+    return joined
 
 
 def _made_of(shape: Shape, material: Material | None, smooth: bool | float | str) -> Shape:

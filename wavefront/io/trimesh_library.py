@@ -34,8 +34,8 @@ def geometries(name: str, kind: str, data: bytes) -> list[dict[str, Any]]:
     """
     mesh_loaders = import_trimesh().exchange.load.mesh_loaders
     with typed_errors(name, kind):
-        found = mesh_loaders[kind](BytesIO(data))
-    return list(found["geometry"].values()) if "geometry" in found else [found]
+        loaded = mesh_loaders[kind](BytesIO(data))
+    return list(loaded["geometry"].values()) if "geometry" in loaded else [loaded]
 
 
 @contextmanager

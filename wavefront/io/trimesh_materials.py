@@ -29,14 +29,14 @@ def material_spec(material: Any, losses: Losses, bare: bool = False) -> Material
     or `Ns`. Otherwise those that trimesh would write into a file count.
     """
     if hasattr(material, "baseColorFactor"):
-        found = _pbr(material)
+        loaded = _pbr(material)
     elif hasattr(material, "diffuse"):
-        found = _simple(material, f"trimesh material {material.name!r}", bare, losses)
+        loaded = _simple(material, f"trimesh material {material.name!r}", bare, losses)
     else:
-        found = MaterialSpec(Material(Diffuse(MATTE)), lost=[type(material).__name__])
+        loaded = MaterialSpec(Material(Diffuse(MATTE)), lost=[type(material).__name__])
     name = getattr(material, "name", None)
-    found.material.name = printable(str(name)) if name else None
-    return found
+    loaded.material.name = printable(str(name)) if name else None
+    return loaded
 
 
 def is_blank(material: Any) -> bool:
@@ -139,9 +139,9 @@ def _simple(material: Any, where: str, bare: bool, losses: Losses) -> MaterialSp
     # of the other images trimesh keeps only the names, without a folder
     gone = [key for key in entry.lines if _is_map(key) and key not in entry.images]
     gone = [entry.lines.pop(key)[0] for key in gone]
-    found = spec(entry)
-    found.lost = [*gone, *entry.unread(), *found.lost]
-    return found
+    loaded = spec(entry)
+    loaded.lost = [*gone, *entry.unread(), *loaded.lost]
+    return loaded
 
 
 def _is_map(key: str) -> bool:

@@ -54,7 +54,7 @@ def read_nrrd(path: str, data: bytes, budget: Budget, name: str | None = None) -
         header = nrrd.read_header(file)
         if away := [field for field in ELSEWHERE if field in header]:
             raise SceneError(f"has the field {away[0]!r}; data are read right behind the header alone")
-        sizes = [int(each) for each in header["sizes"]]
+        sizes = [int(size) for size in header["sizes"]]
         if min(sizes) < 1:
             raise SceneError(f"has the sizes {sizes}")
         needed = math.prod(sizes) * 8
@@ -82,9 +82,9 @@ def read_nrrd(path: str, data: bytes, budget: Budget, name: str | None = None) -
         corner = header["space origin"] - steps.sum(1) / 2 if "space origin" in header else np.zeros(3)
         return np.ascontiguousarray(values, f4), placed(steps * size, corner)
     along = header.get("spacings")
-    each = 1 / np.array(size) if along is None else np.nan_to_num(np.asarray(along[colors:], float), nan=1.0)
+    step = 1 / np.array(size) if along is None else np.nan_to_num(np.asarray(along[colors:], float), nan=1.0)
     low = np.nan_to_num(np.asarray(header.get("axis mins", np.zeros(len(sizes)))[colors:], float))
-    return np.ascontiguousarray(values, f4), placed(np.diag(each * size), low)
+    return np.ascontiguousarray(values, f4), placed(np.diag(step * size), low)
 
 
 def read_vti(path: str, data: bytes, budget: Budget, name: str | None = None) -> tuple[Floats, Doubles]:
@@ -113,18 +113,18 @@ def read_vti(path: str, data: bytes, budget: Budget, name: str | None = None) ->
             ("points", 1, about.Get(keys.POINT_DATA_VECTOR()), reader.GetPointDataArraySelection()),
             ("cells", 0, about.Get(keys.CELL_DATA_VECTOR()), reader.GetCellDataArraySelection()),
         )
-        found = {}
+        arrays = {}
         for kind, more, vector, selection in kinds:
             selection.DisableAllArrays()
             for i in range(vector.GetNumberOfInformationObjects() if vector else 0):
                 field = vector.GetInformationObject(i)
                 entry = field.Get(keys.FIELD_NAME()), field.Get(keys.FIELD_NUMBER_OF_COMPONENTS())
-                found[entry[0] if entry[0] not in found else f"{entry[0]} of {kind}"] = (
+                arrays[entry[0] if entry[0] not in arrays else f"{entry[0]} of {kind}"] = (
                     more,
                     selection,
                     *entry,
                 )
-        more, selection, called, channels = chosen(found, name)
+        more, selection, called, channels = chosen(arrays, name)
         size = [high - low + more for low, high in zip(extent[::2], extent[1::2], strict=True)]
         if min(size) < 1 or channels < 1:
             raise SceneError(f"has {size} {'points' if more else 'cells'} of {channels} components")
@@ -134,10 +134,10 @@ def read_vti(path: str, data: bytes, budget: Budget, name: str | None = None) ->
     finally:
         vtkObject.SetGlobalWarningDisplay(shown)
     image = reader.GetOutput()
-    held = (image.GetPointData() if more else image.GetCellData()).GetArray(called)
-    if reader.GetErrorCode() or held is None or held.GetNumberOfTuples() != math.prod(size):
+    array = (image.GetPointData() if more else image.GetCellData()).GetArray(called)
+    if reader.GetErrorCode() or array is None or array.GetNumberOfTuples() != math.prod(size):
         raise SceneError(f"is damaged: vtk does not read the array {called!r}")
-    values = vtk_to_numpy(held).reshape(*size[::-1], channels)
+    values = vtk_to_numpy(array).reshape(*size[::-1], channels)
     steps = np.array(about.Get(keys.DIRECTION()) or np.eye(3)).reshape(3, 3) * about.Get(keys.SPACING())
     corner = np.array(about.Get(keys.ORIGIN())) + steps @ (np.array(extent[::2]) - more / 2)
     return np.ascontiguousarray(values[..., 0] if channels == 1 else values, f4), placed(steps * size, corner)
@@ -165,22 +165,22 @@ def read_vdb(path: str, data: bytes, budget: Budget, name: str | None = None) ->
         )
     steps, origin = _map(grid)
     boxes = [
-        each.evalActiveVoxelBoundingBox()
-        for each in grids
-        if each.activeVoxelCount()
-        and each.transform.isLinear
-        and np.array_equal(_map(each)[0], steps)
+        other.evalActiveVoxelBoundingBox()
+        for other in grids
+        if other.activeVoxelCount()
+        and other.transform.isLinear
+        and np.array_equal(_map(other)[0], steps)
         # the same voxels at the same places
-        and np.array_equal(_map(each)[1], origin)
+        and np.array_equal(_map(other)[1], origin)
     ]
     if not boxes:
         raise SceneError(f"grid {grid.name!r} has no active voxels")
     low, high = (extreme([box[i] for box in boxes], 0) for i, extreme in ((0, np.min), (1, np.max)))
-    low, size = low - 1, [int(each) for each in high - low + 3]
+    low, size = low - 1, [int(length) for length in high - low + 3]
     channels = (3,) if kind.startswith("vec3") else ()
     budget.charge("the grid", 2 * 8 * math.prod((*size, *channels)))
     values = np.zeros((*size, *channels), f4)
-    grid.copyToArray(values, ijk=tuple(int(each) for each in low))
+    grid.copyToArray(values, ijk=tuple(int(index) for index in low))
     if np.any(grid.background):
         warn_caller(
             f"{path}: grid {grid.name!r} has the background {grid.background} in all space; it is kept up to "

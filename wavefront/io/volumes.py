@@ -109,12 +109,12 @@ def _vol(path: str, data: bytes, budget: Budget, name: str | None) -> tuple[Floa
     _, version, kind, width, height, depth, channels, *box = VOL_HEADER.unpack_from(data)
     if version != 3 or kind != VOL_FLOAT32:
         raise SceneError(f"has version {version} and values of type {kind}; 3 and 1, float32, are read")
-    size, there = (width, height, depth, channels), len(data) - VOL_HEADER.size
-    if min(size) < 1 or math.prod(size) * 4 != there:
+    size, bytes_left = (width, height, depth, channels), len(data) - VOL_HEADER.size
+    if min(size) < 1 or math.prod(size) * 4 != bytes_left:
         raise SceneError(
-            f"claims {width} × {height} × {depth} voxels of {channels} channels; {there} bytes follow"
+            f"claims {width} × {height} × {depth} voxels of {channels} channels; {bytes_left} bytes follow"
         )
-    budget.charge("the grid", there)
+    budget.charge("the grid", bytes_left)
     values = np.frombuffer(data, "<f4", offset=VOL_HEADER.size).reshape(depth, height, width, channels)
     grid = values[..., 0] if channels == 1 else values
     low, high = np.array(box, np.float64).reshape(2, 3)

@@ -94,8 +94,8 @@ def total(name: str, children: Mapping[str, list[str]], own: Callable[[str], int
         if len(above) >= MAX_DEPTH:
             raise SceneError(f"{name}: its nodes are nested deeper than {MAX_DEPTH}")
         if node not in known:
-            parts = (below(child, (*above, node)) for child in children.get(node, []))
-            known[node] = own(node) + sum(parts)
+            counts = (below(child, (*above, node)) for child in children.get(node, []))
+            known[node] = own(node) + sum(counts)
         return known[node]
 
     return below(root, ())
