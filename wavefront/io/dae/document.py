@@ -45,9 +45,9 @@ def parse(files: SceneFiles, data: bytes, materials: bool) -> Contents:
     meshes = DaeMeshes(files, read, materials)
     contents = meshes.contents()
     # pycollada drops damaged parts without a warning
-    there = total(name, document.children, lambda node: document.primitives.get(node, 0), "scene")
-    if meshes.count < there:
-        damaged = f"{there - meshes.count} of {there} parts of its geometry"
+    expected = total(name, document.children, lambda node: document.primitives.get(node, 0), "scene")
+    if meshes.count < expected:
+        damaged = f"{expected - meshes.count} of {expected} parts of its geometry"
         files.losses.note(damaged, value="damaged", done="left out")
     contents.places.scale(meters(files.losses, "unit", read.assetInfo.unitmeter, 1.0))
     contents.up = document.up
@@ -55,13 +55,13 @@ def parse(files: SceneFiles, data: bytes, materials: bool) -> Contents:
 
 
 def _read(files: SceneFiles, data: bytes) -> Any:
-    """Return what pycollada reads of a file, a second time with mended numbers if it cannot read all."""
+    """Return the document that pycollada reads; of mended data if it cannot read all of the file."""
     read, error = None, None
     if not is_doubtful(data):
         try:
             read = _collada(files.name, data)
-        except SceneError as found:
-            error = found
+        except SceneError as refusal:
+            error = refusal
     if read is None or read.errors:
         with typed_errors(files.name, "dae"):
             better = mended(data)
@@ -101,8 +101,8 @@ class _Document:
     def _begin(self, tag: str, attributes: dict[str, str], at: int) -> None:
         if tag in LOST:
             self.lost.setdefault(tag, self._data.count(b"\n", 0, at) + 1)
-        if tag == "up_axis" and (found := UP_AXIS.match(self._data, at + 1)) is not None:
-            self.up = found[1].decode().lower()
+        if tag == "up_axis" and (axis := UP_AXIS.match(self._data, at + 1)) is not None:
+            self.up = axis[1].decode().lower()
         if tag in PLACES:
             key = "scene" if tag == "scene" else "#" + attributes.get("id", f" {at}")
             if self._inside:

@@ -33,8 +33,8 @@ NO_NUMBER, NO_INDEX = "1e39", -1  # what has one of these is left out
 
 
 def is_doubtful(data: bytes) -> bool:
-    """Return whether a text of numbers has something else, or pycollada does not check all indices."""
-    texts = (found[1] + b" " for found in NUMBERS.finditer(data))
+    """Return True if a text of numbers has something else, or pycollada does not check all indices."""
+    texts = (match[1] + b" " for match in NUMBERS.finditer(data))
     return UNCHECKED.search(data) is not None or any(map(_is_malformed, texts))
 
 
@@ -46,10 +46,10 @@ def _is_malformed(text: bytes) -> bool:
 def mended(data: bytes) -> bytes | None:
     """Return a document that says so where a number is damaged, or an index too large; None without these."""
     root = ElementTree.fromstring(data)
-    changed = [_mend_numbers(each) for each in root.iterfind(".//{*}float_array")]
+    changed = [_mend_numbers(numbers) for numbers in root.iterfind(".//{*}float_array")]
     for mesh in root.iterfind(".//{*}mesh"):
         rows = _rows(mesh)
-        changed += [_mend_indices(part, rows) for part in mesh if _tag(part) in PRIMITIVES]
+        changed += [_mend_indices(primitive, rows) for primitive in mesh if _tag(primitive) in PRIMITIVES]
     return ElementTree.tostring(root) if any(changed) else None
 
 
@@ -65,15 +65,15 @@ def _mend_numbers(element: Any) -> bool:
 
 
 def _rows(mesh: Any) -> dict[str, int]:
-    """Return how many rows each source of a mesh has, by its reference."""
+    """Return the number of rows of each source of a mesh, by its reference."""
     rows = {}
     for source in mesh.iterfind("{*}source"):
-        count = sum(len((each.text or "").split()) for each in source.iterfind("{*}float_array"))
-        strides = [each.get("stride", "1") for each in source.iterfind(".//{*}accessor")]
+        count = sum(len((array.text or "").split()) for array in source.iterfind("{*}float_array"))
+        strides = [accessor.get("stride", "1") for accessor in source.iterfind(".//{*}accessor")]
         stride = int(strides[0]) if strides and strides[0].isdecimal() else 1
         rows[f"#{source.get('id')}"] = count // max(stride, 1)
     for vertices in mesh.iterfind("{*}vertices"):
-        used = [rows.get(each.get("source", ""), 0) for each in vertices.iterfind("{*}input")]
+        used = [rows.get(reference.get("source", ""), 0) for reference in vertices.iterfind("{*}input")]
         rows[f"#{vertices.get('id')}"] = min(used, default=0)
     return rows
 
@@ -81,11 +81,11 @@ def _rows(mesh: Any) -> dict[str, int]:
 def _mend_indices(primitive: Any, rows: dict[str, int]) -> bool:
     """Mend the indices of a primitive, which come in groups: one for each offset of its inputs."""
     most: dict[int, int] = {}
-    for each in primitive.iterfind("{*}input"):
-        offset = each.get("offset", "0")
+    for reference in primitive.iterfind("{*}input"):
+        offset = reference.get("offset", "0")
         if offset.isdecimal() and len(offset) < 3:
             number = int(offset)
-            most[number] = min(most.get(number, MOST), rows.get(each.get("source", ""), MOST))
+            most[number] = min(most.get(number, MOST), rows.get(reference.get("source", ""), MOST))
     width = max(most, default=0) + 1
     limits = np.array([most.get(offset, MOST) for offset in range(width)])
     whole = width * (3 if _tag(primitive) == "triangles" else 1)
@@ -93,13 +93,13 @@ def _mend_indices(primitive: Any, rows: dict[str, int]) -> bool:
     for element in primitive.iter():
         if _tag(element) in ("p", "h", "vcount"):
             words = (element.text or "").split()
-            found = np.array(
+            indices = np.array(
                 [int(word) if re.fullmatch(r"\d{1,9}", word) else NO_INDEX for word in words], int
             )
             if _tag(element) != "vcount":
-                found = found[: len(found) // whole * whole].reshape(-1, width)
-                found = np.where(found < limits, found, NO_INDEX).ravel()
-            better = [str(index) for index in found.tolist()]
+                indices = indices[: len(indices) // whole * whole].reshape(-1, width)
+                indices = np.where(indices < limits, indices, NO_INDEX).ravel()
+            better = [str(index) for index in indices.tolist()]
             changed |= better != words
             element.text = " ".join(better)
     return changed

@@ -47,7 +47,7 @@ class DaeMeshes:
                     continue
                 identity = str(node.geometry.id)
                 with self._files.losses.part(f"geometry {identity!r}"), typed_errors(self._files.name, "dae"):
-                    raw = self._raw(primitive, {each.symbol: each.target for each in node.materials})
+                    raw = self._raw(primitive, {binding.symbol: binding.target for binding in node.materials})
                     raw.name = names(identity, contains=raws, counts=counts)
                     raws[raw.name] = raw
                     matrices.append(matrix)
@@ -86,12 +86,12 @@ class DaeMeshes:
         if rows.ndim == 3:  # triangles
             return self._sound(rows.reshape(-1, rows.shape[2]), np.full(len(rows), 3))
         counts = np.asarray(primitive.vcounts, np.intp)
-        there = (counts >= 0) & (np.cumsum(np.maximum(counts, 0)) <= len(rows))
-        if not there.all():
-            counts = counts[: there.argmin()]
-            self._note(f"{plural(len(there) - len(counts), 'polygon')} without indices", done="left out")
-        found = _with_holes(primitive, rows.shape[1])
-        cut = [self._cut(rings, points, offset, rows.shape[1]) for rings in found]
+        exists = (counts >= 0) & (np.cumsum(np.maximum(counts, 0)) <= len(rows))
+        if not exists.all():
+            counts = counts[: exists.argmin()]
+            self._note(f"{plural(len(exists) - len(counts), 'polygon')} without indices", done="left out")
+        polygons = _with_holes(primitive, rows.shape[1])
+        cut = [self._cut(rings, points, offset, rows.shape[1]) for rings in polygons]
         rows = np.concatenate([rows[: counts.sum()], *cut])
         return self._sound(rows, np.append(counts, [3] * (sum(map(len, cut)) // 3)).astype(np.intp))
 
@@ -125,9 +125,9 @@ class DaeMeshes:
         if material.id not in self._specs:
             read = import_trimesh().exchange.dae._parse_material(material.effect, self._images)
             self._images.report()
-            found = self._specs[material.id] = material_spec(read, self._files.losses)
-            for each in found.lost:
-                self._note(each)
+            converted = self._specs[material.id] = material_spec(read, self._files.losses)
+            for lost in converted.lost:
+                self._note(lost)
             if read.baseColorFactor is not None and read.baseColorFactor[3] < 255:
                 self._note("opacity of materials")
         return self._specs[material.id]
@@ -148,10 +148,10 @@ def _nodes(nodes: Any, matrix: Matrix) -> Iterator[tuple[Any, Matrix]]:
 
 def _with_holes(primitive: Any, width: int) -> list[list[Ints]]:
     """Return the rings of the polygons with holes, which pycollada leaves out: rows (c, k) of indices."""
-    found = []
+    polygons = []
     for element in primitive.xmlnode:
         if str(element.tag).endswith("}ph"):
             texts = [ring.text or "" for ring in element]
             rings = [np.array(text.split(), np.intp) for text in texts]
-            found.append([ring[: len(ring) // width * width].reshape(-1, width) for ring in rings])
-    return found
+            polygons.append([ring[: len(ring) // width * width].reshape(-1, width) for ring in rings])
+    return polygons

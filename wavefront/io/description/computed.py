@@ -29,13 +29,16 @@ class Computed(BaseTexture):
     ) -> None:
         self.function, self._limits = function, limits
         self.parts = tuple(
-            part if isinstance(part, BaseTexture) else np.asarray(part, f4).reshape(-1, 1)  # (1, 1) or (3, 1)
-            for part in parts
+            argument
+            if isinstance(argument, BaseTexture)
+            else np.asarray(argument, f4).reshape(-1, 1)  # (1, 1) or (3, 1)
+            for argument in parts
         )
-        textures = [part for part in parts if isinstance(part, BaseTexture)]
-        self.reads = tuple(dict.fromkeys(field for each in textures for field in each.reads))
+        textures = [argument for argument in parts if isinstance(argument, BaseTexture)]
+        self.reads = tuple(dict.fromkeys(field for texture in textures for field in texture.reads))
         self.scalar = scalar or all(
-            part.scalar if isinstance(part, BaseTexture) else np.ndim(part) == 0 for part in parts
+            argument.scalar if isinstance(argument, BaseTexture) else np.ndim(argument) == 0
+            for argument in parts
         )
 
     def __repr__(self) -> str:
@@ -48,8 +51,10 @@ class Computed(BaseTexture):
 
     def at(self, surface: SurfaceInteraction) -> Floats:
         """Return the values of the function, (n,) or (3, n)."""
-        found = (part.at(surface) if isinstance(part, BaseTexture) else part for part in self.parts)
-        values = self.function(*(np.atleast_2d(each) for each in found))
+        arguments = (
+            argument.at(surface) if isinstance(argument, BaseTexture) else argument for argument in self.parts
+        )
+        values = self.function(*(np.atleast_2d(argument) for argument in arguments))
         values = np.broadcast_to(values, (len(values), values.shape[1])).astype(f4)
         return values[0] if self.scalar else np.broadcast_to(values, (3, values.shape[1]))
 
@@ -73,9 +78,9 @@ def limits_of(value: Value) -> tuple[float, ...]:
 
 def computed(function: Callable[..., Any], *parts: Value, rising: bool = True) -> Value:
     """Return a function of numbers, colors and textures, that rises with all of them where `rising`."""
-    if not any(isinstance(part, BaseTexture) for part in parts):
+    if not any(isinstance(argument, BaseTexture) for argument in parts):
         return function(*parts)
-    limits = [limits_of(part) for part in parts]
+    limits = [limits_of(argument) for argument in parts]
     known = rising and all(limits)
     ends = tuple(float(function(*end)) for end in zip(*limits, strict=True)) if known else ()
     return Computed(function, *parts, limits=ends)
@@ -99,7 +104,7 @@ def texture_within(losses: Losses, name: str, value: BaseTexture, high: float, p
     limits = value.limits()
     if not limits or (limits[0] >= 0 and limits[1] <= high):
         return value
-    found, end = f"{exact(limits[0])} to {exact(limits[1])}", "1" if high == 1 else "more"
-    losses.note(f"{name}, a texture,", place, found, f"clamped to 0 to {end}")
+    span, end = f"{exact(limits[0])} to {exact(limits[1])}", "1" if high == 1 else "more"
+    losses.note(f"{name}, a texture,", place, span, f"clamped to 0 to {end}")
     within: BaseTexture = clipped(value) if high == 1 else computed(np.maximum, value, 0.0)
     return within

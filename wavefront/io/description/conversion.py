@@ -83,55 +83,55 @@ class Conversion:
     instances: int = 0
     instead: dict[str, tuple[Any, str]] = field(default_factory=lambda: dict(INSTEAD))
 
-    def convert(self, part: Entity) -> Any:
-        """Return what becomes of a part; the same object for the same part."""
-        if part not in self.made:
-            if part in self.making:
-                raise SceneError(f"{part.label}: refers to itself")
-            self.making.append(part)
+    def convert(self, entity: Entity) -> Any:
+        """Return the object that an entity becomes; the same object for the same entity."""
+        if entity not in self.made:
+            if entity in self.making:
+                raise SceneError(f"{entity.label}: refers to itself")
+            self.making.append(entity)
             try:
-                self.made[part] = self._sound(part)
+                self.made[entity] = self._sound(entity)
             finally:
                 self.making.pop()
-        return self.made[part]
+        return self.made[entity]
 
-    def _sound(self, part: Entity) -> Any:
-        """Return what becomes of a part; where it is damaged, what stands for it, which is noted."""
-        if part.kind == "scene":
-            with placed(part.label, self.name):
-                return self.converted(part)
+    def _sound(self, entity: Entity) -> Any:
+        """Return the object of an entity; of a damaged one its replacement, which is noted."""
+        if entity.kind == "scene":
+            with placed(entity.label, self.name):
+                return self.converted(entity)
         try:
-            with placed(part.label, self.name):
-                return self.converted(part)
+            with placed(entity.label, self.name):
+                return self.converted(entity)
         except SceneError:
-            make, done = self.stand_in(part)
-            with self.files.losses.part(part.label, done):
+            make, done = self.stand_in(entity)
+            with self.files.losses.part(entity.label, done):
                 raise
         return make()
 
-    def stand_in(self, part: Entity) -> tuple[Callable[[], Any], str]:
-        """Return what makes that which stands for a damaged part, and what is said of it."""
-        made, done = self.instead.get(part.kind, (None, "left out"))
+    def stand_in(self, entity: Entity) -> tuple[Callable[[], Any], str]:
+        """Return a function that makes the replacement of a damaged entity, and the words for its note."""
+        made, done = self.instead.get(entity.kind, (None, "left out"))
         return lambda: made, done
 
-    def converted(self, part: Entity) -> Any:
-        """Return what becomes of a part, and note which of its parameters do not count."""
-        maker = self.table.find(part.kind, part.type)
+    def converted(self, entity: Entity) -> Any:
+        """Return the object of an entity, and note the parameters that have no effect."""
+        maker = self.table.find(entity.kind, entity.type)
         if maker.convert is None:
-            return self.replaced(part)
-        part.check()
-        made = maker.convert(part)
-        part.report()
+            return self.replaced(entity)
+        entity.check()
+        made = maker.convert(entity)
+        entity.report()
         return made
 
-    def replaced(self, part: Entity) -> Any:
-        """Return what stands for a part that is not supported, which is noted."""
-        made, what = self.instead.get(part.kind, (None, "left out"))
-        part.lose(what)
+    def replaced(self, entity: Entity) -> Any:
+        """Return the replacement of an entity that is not supported, which is noted."""
+        made, what = self.instead.get(entity.kind, (None, "left out"))
+        entity.lose(what)
         return made
 
     def once(self, key: Any, make: Callable[[], Any]) -> Any:
-        """Return what is made for a key, the same object for the same key."""
+        """Return the object of a key, made at the first call."""
         if key not in self.made:
             self.made[key] = make()
         return self.made[key]
@@ -150,14 +150,14 @@ class Conversion:
         made: Material = self.once((id(material), *parts, *values), make)[0]
         return made
 
-    def picture(self, part: Entity, reference: str, instead: StoredImage = GRAY_PIXEL) -> StoredImage:
-        """Return the image whose file a part names; a gray one if it is missing or damaged."""
+    def picture(self, entity: Entity, reference: str, instead: StoredImage = GRAY_PIXEL) -> StoredImage:
+        """Return the image whose file an entity names; a gray one if it is missing or damaged."""
         read = lambda: self.files.stored(self.find(reference))  # noqa: E731
-        return self.files.shown(reference, read, part.label, instead) or instead
+        return self.files.shown(reference, read, entity.label, instead) or instead
 
-    def measured(self, part: Entity) -> Measured:
-        """Return the BSDF of the measured material whose file a part names."""
-        path = self.find(part.text("filename", ""))
+    def measured(self, entity: Entity) -> Measured:
+        """Return the BSDF of the measured material whose file an entity names."""
+        path = self.find(entity.text("filename", ""))
         made: Measured = self.once(
             ("measured", path), lambda: Measured.from_bytes(str(path), self.files.read(path))
         )
@@ -185,8 +185,8 @@ def only_one(lights: Sequence[Light], losses: Losses) -> list[Light]:
     """Return lights with the first `Environment` alone; others are noted."""
     around = [light for light in lights if isinstance(light, Environment)]
     if len(around) > 1:
-        found = plural(len(around) - 1, "further light from all around", "further lights from all around")
-        losses.note(found, done="left out")
+        further = plural(len(around) - 1, "further light from all around", "further lights from all around")
+        losses.note(further, done="left out")
     return [light for light in lights if light not in around[1:]]
 
 
@@ -200,21 +200,21 @@ def shown(shapes: list[Shape], lights: Sequence[Light], losses: Losses) -> list[
     """
     if shapes:
         return shapes
-    if not any(isinstance(each, Environment | Sky) for each in lights):
+    if not any(isinstance(light, Environment | Sky) for light in lights):
         raise losses.nothing("has no shapes")
     return [Sphere((0, 0, 0), 1, material=null_surface(), name="nothing")]
 
 
-def textures_in(thing: Any, kind: type[T] = BaseTexture) -> list[T]:  # type: ignore[assignment]
-    """Return the textures of a kind in a material, in a part of one, or in several of these."""
-    found: dict[int, Any] = {}
-    waiting = [thing]
+def textures_in(root: Any, kind: type[T] = BaseTexture) -> list[T]:  # type: ignore[assignment]
+    """Return the textures of a kind that a material, a BSDF or a tuple of these holds."""
+    visited: dict[int, Any] = {}
+    waiting = [root]
     while waiting:
-        part = waiting.pop()
-        if id(part) not in found and (isinstance(part, tuple) or hasattr(part, "__dict__")):
-            found[id(part)] = part
+        node = waiting.pop()
+        if id(node) not in visited and (isinstance(node, tuple) or hasattr(node, "__dict__")):
+            visited[id(node)] = node
             inside = (
-                () if isinstance(part, kind) else part if isinstance(part, tuple) else vars(part).values()
+                () if isinstance(node, kind) else node if isinstance(node, tuple) else vars(node).values()
             )
             waiting += inside
-    return [part for part in found.values() if isinstance(part, kind)]
+    return [node for node in visited.values() if isinstance(node, kind)]

@@ -88,7 +88,7 @@ class Table:
         self.kinds.update(dict.fromkeys(types.split(), maker.kind))
 
     def find(self, kind: str, name: str) -> Maker:
-        """Return how entities of a type are converted.
+        """Return the maker of the entities of a type.
 
         Raises
         ------
@@ -96,7 +96,7 @@ class Table:
             If there is no such type.
         """
         if (kind, name) not in self.makers:
-            known = [each for of, each in self.makers if of == kind]
+            known = [type_name for of, type_name in self.makers if of == kind]
             raise SceneError(f"{self.name} has no such {kind}{did_you_mean(name, known)}")
         return self.makers[kind, name]
 
@@ -149,7 +149,7 @@ class Entity:
 
     def report(self) -> None:
         """Note the parameters that have not counted."""
-        for name in [each for each in self.values if each in self.unread] if self.unread else ():
+        for name in [unread for unread in self.values if unread in self.unread] if self.unread else ():
             value = self.values[name]
             self.lose(f"{value.kind} {name!r}" if isinstance(value, Entity) else name)
         self.unread.clear()
@@ -173,8 +173,8 @@ class Entity:
         if old in self.unread and new not in self.values:
             self.unread.add(new)
         self.unread.discard(old)
-        for each in (self.values, self.types):
-            each.setdefault(new, each.pop(old))
+        for columns in (self.values, self.types):
+            columns.setdefault(new, columns.pop(old))
 
     def harmless(self, names: str) -> None:
         """Note that parameters do not change the picture."""
@@ -182,18 +182,18 @@ class Entity:
 
     def _held(self, kinds: tuple[str, ...]) -> list[tuple[str, Entity]]:
         named = self.values.items()
-        return [(name, each) for name, each in named if isinstance(each, Entity) and each.kind in kinds]
+        return [(name, child) for name, child in named if isinstance(child, Entity) and child.kind in kinds]
 
     def held(self, kind: str) -> list[Entity]:
         """Return the entities of a kind that it holds."""
-        return [each for _, each in self._held((kind,))]
+        return [child for _, child in self._held((kind,))]
 
     def only(self, kind: str) -> Entity:
         """Return the first entity of a kind that it must hold."""
-        held = self.held(kind)
-        if not held:
+        children = self.held(kind)
+        if not children:
             raise SceneError(f"{self.label} holds no {kind}")
-        return held[0]
+        return children[0]
 
     def get(self, name: str, default: Any = None, *types: str) -> Any:
         """Return a parameter as it is: of one of some types, where the format has types.
@@ -224,7 +224,7 @@ class Entity:
         return first.item() if name in self.types and isinstance(first, np.generic) else first
 
     def or_default(self, default: T, read: Callable[[], T]) -> T:
-        """Return what `read` returns; where it fails, that is noted, and the default stands in its place.
+        """Return the value that `read` returns; where it fails, that is noted, and the default is used.
 
         Raises
         ------
@@ -247,11 +247,11 @@ class Entity:
             value = self.one(name, default, *NUMBERS)
             if limit is None:
                 return number(name, value)
-            found = number(name, value)
-            near = round(found, DIGITS) + 0.0
-            if limit.holds(found) or not limit.holds(near):
+            checked = number(name, value)
+            near = round(checked, DIGITS) + 0.0
+            if limit.holds(checked) or not limit.holds(near):
                 return number(name, value, *limit)
-            self.lost.note(name, self.label, exact(found), f"taken as {exact(near)}")
+            self.lost.note(name, self.label, exact(checked), f"taken as {exact(near)}")
             return near
 
         return self.or_default(default, read)
@@ -297,7 +297,7 @@ class Entity:
 
 
 def _brief(value: Any) -> str:
-    """Return what a message says of a default."""
+    """Return the words for a default in a message."""
     if np.shape(value) == (4, 4):
         return "no transform"
     return str(np.asarray(value).tolist()) if np.ndim(value) else repr(value) if value != "" else "nothing"

@@ -106,9 +106,9 @@ def place_shapes(name: str, raws: list[RawMesh], places: Places, losses: Losses)
             )
         for i in at[~fit].tolist():
             shapes[i] = build(name, moved_raw(raw, places.matrix[i]), losses)
-    for shape, own in zip(shapes, places.names or (), strict=False):
-        if shape is not None and own:
-            shape.name = own
+    for shape, shape_name in zip(shapes, places.names or (), strict=False):
+        if shape is not None and shape_name:
+            shape.name = shape_name
     for shape, made_of in zip(shapes, places.materials or (), strict=False):
         if shape is not None and made_of is not None:
             shape.material = made_of
@@ -155,11 +155,11 @@ def facing(raw: RawMesh, reverse: bool) -> RawMesh:
     faces, normals = raw.faces, raw.normals
     if normals is not None:
         ahead = np.empty(len(faces), np.bool_)
-        for part in spans(len(faces), AT_ONCE):
-            corners = (raw.vertices.take(each, 0, mode="clip") for each in faces[part].T)
-            a, b, c = (np.ascontiguousarray(each.T) for each in corners)
-            mean = normals.take(faces[part], 0, mode="clip").sum(1).T
-            ahead[part] = dot(cross(b - a, c - a), mean) >= 0
+        for block in spans(len(faces), AT_ONCE):
+            corners = (raw.vertices.take(column, 0, mode="clip") for column in faces[block].T)
+            a, b, c = (np.ascontiguousarray(corner.T) for corner in corners)
+            mean = normals.take(faces[block], 0, mode="clip").sum(1).T
+            ahead[block] = dot(cross(b - a, c - a), mean) >= 0
         if not ahead.all():
             faces = np.where(ahead[:, None], faces, faces[:, ::-1])
     if reverse:

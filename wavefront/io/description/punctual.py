@@ -42,8 +42,8 @@ def punctual_light(
 
 def _cone(spot: dict[str, Any], losses: Losses, place: str) -> tuple[float, float]:
     """Return the angle of a spot in degrees, and the part of it over which light falls off."""
-    given = [spot.get("innerConeAngle", 0), spot.get("outerConeAngle", np.pi / 4)]
-    inner, outer = floats("cone", given, 2)
+    angles = [spot.get("innerConeAngle", 0), spot.get("outerConeAngle", np.pi / 4)]
+    inner, outer = floats("cone", angles, 2)
     outer = float(losses.within("outerConeAngle", outer, np.pi / 2**20, np.pi / 2, place))
     inner = float(losses.within("innerConeAngle", inner, 0, outer, place))
     return float(np.degrees(2 * outer)), 1 - inner / outer

@@ -18,23 +18,23 @@ OWN = re.compile(r"n?[xyz]|[uvst]|texture_[uv]|vertex_ind\w+")  # properties tha
 
 def ply_attributes(rows: dict[str, Rows], face: Ints) -> dict[str, Table]:
     """Return the attributes of a file, (n, 1 or 3) for each name, given the face (m,) of each triangle."""
-    found: dict[str, Table] = {}
+    attributes: dict[str, Table] = {}
     for kind in ("vertex", "face"):
         columns = rows[kind].columns if kind in rows else {}
         names = [name for name in columns if not OWN.fullmatch(name)]
 
-        def add(name: str, parts: Sequence[str], kind: str = kind) -> None:
-            values = rows[kind].units(parts)
+        def add(name: str, components: Sequence[str], kind: str = kind) -> None:
+            values = rows[kind].units(components)
             if values is not None:
-                found.setdefault(f"{kind}_{name}", values if kind == "vertex" else values[face])
+                attributes.setdefault(f"{kind}_{name}", values if kind == "vertex" else values[face])
 
         for colors in (("r", "g", "b"), ("red", "green", "blue")):
             if set(colors) <= set(names):
                 add("color", colors)
         for name in names:
             prefix, separator, last = name.rpartition("_")
-            series = next((each for each in SERIES if last == each[0]), None)
+            series = next((suffixes for suffixes in SERIES if last == suffixes[0]), None)
             if separator and series is not None:
-                parts = [f"{prefix}_{each}" for each in series]
-                add(prefix, parts if set(parts) <= set(names) else [name])
-    return found
+                components = [f"{prefix}_{suffix}" for suffix in series]
+                add(prefix, components if set(components) <= set(names) else [name])
+    return attributes

@@ -49,7 +49,11 @@ def read_header(name: str, data: bytes) -> Header:
     order = "" if "format ascii" in text else ">" if "big_endian" in text else "<"
     textures = re.findall(r"(?im)^comment\s+texturefile\s+(.*?)\s*$", text)
     return Header(
-        _elements(name, text), order, [each for each in textures if each], end.end(), text.count("\n") + 1
+        _elements(name, text),
+        order,
+        [texture for texture in textures if texture],
+        end.end(),
+        text.count("\n") + 1,
     )
 
 
@@ -60,7 +64,7 @@ def unread(elements: list[Element]) -> list[str]:
         if element.count and element.name not in READ:
             out.append(f"element {element.name}")
         elif element.count:
-            names = [each.name for each in element.properties]
+            names = [prop.name for prop in element.properties]
             read = READ[element.name] if set(RGB) <= set(names) else READ[element.name] - {*RGB, "alpha"}
             out += [f"{name} of {element.name}" for name in names if name not in read]
     return out

@@ -47,15 +47,15 @@ def parse(files: SceneFiles, data: bytes, materials: bool) -> Parsed:
     header = read_header(files.name, data)
     rows = read_rows(header, data)
     note_damage(files.losses, rows)
-    for each in unread(header.elements) if materials else ():
-        files.losses.note(each)
+    for ignored in unread(header.elements) if materials else ():
+        files.losses.note(ignored)
     vertex = rows.get("vertex")
     points = None if vertex is None else vertex.table("xyz")
     if vertex is None or points is None:
         return Parsed(Contents.once([]), rows, NONE.row)
-    if not any(each.count for each in header.elements if each.name in ("face", "tristrips")):
-        found = cloud(files.losses, points, _codes(vertex))
-        shapes = [] if found is None else [found]
+    if not any(element.count for element in header.elements if element.name in ("face", "tristrips")):
+        spheres = cloud(files.losses, points, _codes(vertex))
+        shapes = [] if spheres is None else [spheres]
         return Parsed(Contents(shapes=shapes), rows, NONE.row)
     points[bad_rows(vertex)] = np.nan
     faces = _faces(files, rows, points)
@@ -92,21 +92,21 @@ def _of_strips(losses: Losses, rows: Rows, named: str, points: Doubles) -> Faces
     counts, values = rows.lists[named]
     with np.errstate(all="ignore"):
         vertices = values.astype(np.intp)
-    parts = [NONE]
+    strips = [NONE]
     for number, strip in enumerate(np.split(np.arange(len(values)), np.cumsum(counts)[:-1])):
         for run in np.split(strip, np.flatnonzero(vertices[strip] == -1)):
             run = run[vertices[run] != -1]
             if len(run) >= 3:
                 corner = np.stack([run[:-2], run[1:-1], run[2:]], axis=1)
                 corner[1::2] = corner[1::2, [1, 0, 2]]
-                parts.append(Faces(vertices[corner], np.full(len(corner), number), corner))
-    triangles, row, corner = map(np.concatenate, zip(*parts, strict=True))
+                strips.append(Faces(vertices[corner], np.full(len(corner), number), corner))
+    triangles, row, corner = map(np.concatenate, zip(*strips, strict=True))
     inside = ((triangles >= 0) & (triangles < len(points))).all(1)
     lost = np.zeros(rows.count, np.bool_)
     lost[row[~inside]] = True
     note_rows(losses, rows, lost, f"with a vertex beyond the {len(points)}")
-    kept = inside & (triangles != np.roll(triangles, 1, axis=1)).all(1)
-    return Faces(triangles[kept], row[kept], corner[kept])
+    keep = inside & (triangles != np.roll(triangles, 1, axis=1)).all(1)
+    return Faces(triangles[keep], row[keep], corner[keep])
 
 
 def _with_uvs_of_corners(files: SceneFiles, raw: RawMesh, rows: dict[str, Rows], faces: Faces) -> RawMesh:
@@ -130,18 +130,18 @@ def _with_uvs_of_corners(files: SceneFiles, raw: RawMesh, rows: dict[str, Rows],
 
 def _colors(rows: Rows | None) -> Table | None:
     """Return linear colors (n, 4) of rows, None if they have none."""
-    found = None if rows is None else rows.units(RGB)
-    if rows is None or found is None:
+    rgb = None if rows is None else rows.units(RGB)
+    if rows is None or rgb is None:
         return None
     alpha = rows.units(["alpha"])
-    codes = np.ones((len(found), 1)) if alpha is None else np.rint(alpha * 255) / 255
-    return np.hstack([from_srgb(found), codes])
+    codes = np.ones((len(rgb), 1)) if alpha is None else np.rint(alpha * 255) / 255
+    return np.hstack([from_srgb(rgb), codes])
 
 
 def _codes(vertex: Rows) -> Table | None:
     """Return the colors of points as codes (n, 3) of sRGB."""
-    found = vertex.units(RGB)
-    return None if found is None else np.rint(np.clip(np.nan_to_num(found), 0, 1) * 255).astype(np.uint8)
+    rgb = vertex.units(RGB)
+    return None if rgb is None else np.rint(np.clip(np.nan_to_num(rgb), 0, 1) * 255).astype(np.uint8)
 
 
 def _colored(files: SceneFiles, raw: RawMesh, rows: dict[str, Rows], faces: Faces, textured: bool) -> RawMesh:
@@ -153,8 +153,8 @@ def _colored(files: SceneFiles, raw: RawMesh, rows: dict[str, Rows], faces: Face
     if _has_strips(rows):
         of_faces = None
     if textured:
-        for each, what in ((of_vertices, "vertex"), (of_faces, "face")):
-            if each is not None:
+        for colors, what in ((of_vertices, "vertex"), (of_faces, "face")):
+            if colors is not None:
                 files.losses.note(f"{what} colors")
         return raw
     if of_faces is not None and (of_vertices is None or (of_vertices == 1).all()):

@@ -20,8 +20,8 @@ BYTE_ORDERS: dict[str, Literal["little", "big"]] = {"<": "little", ">": "big"}
 
 def read_rows(header: Header, data: bytes) -> dict[str, Rows]:
     """Return the rows of each element, by its name."""
-    found = (_binary if header.order else _text)(header, data)
-    return {rows.element.name: rows for rows in found}
+    elements = (_binary if header.order else _text)(header, data)
+    return {rows.element.name: rows for rows in elements}
 
 
 def _text(header: Header, data: bytes) -> list[Rows]:
@@ -29,10 +29,10 @@ def _text(header: Header, data: bytes) -> list[Rows]:
     used = np.array([number for number, line in enumerate(lines) if line and not line.isspace()], np.intp)
     out, at = [], 0
     for element in header.elements:
-        own = used[at : at + element.count]
-        at += len(own)
-        rows = rows_of_lines(element, [lines[number].split() for number in own.tolist()])
-        rows.lines = own + header.lines + 1
+        numbers = used[at : at + element.count]
+        at += len(numbers)
+        rows = rows_of_lines(element, [lines[number].split() for number in numbers.tolist()])
+        rows.lines = numbers + header.lines + 1
         out.append(rows)
     return out
 
@@ -49,45 +49,45 @@ def _alike(element: Element, data: bytes, at: int, order: str) -> tuple[Rows, in
     """Return rows whose lists are as long as those of the first, and where they end; None if not all are."""
     kinds: list[Any] = []
     size = 0
-    for number, each in enumerate(element.properties):
+    for number, prop in enumerate(element.properties):
         count = 1
-        if each.length:
-            place = slice(at + size, at + size + int(each.length[1]))
-            count = _length(data[place], each, order)
-            if not 0 <= count * each.size <= len(data):
+        if prop.length:
+            place = slice(at + size, at + size + int(prop.length[1]))
+            count = _length(data[place], prop, order)
+            if not 0 <= count * prop.size <= len(data):
                 return None
-            kinds.append((f"length {number}", order + each.length))
-        kinds.append((str(number), order + each.kind, (count,)))
+            kinds.append((f"length {number}", order + prop.length))
+        kinds.append((str(number), order + prop.kind, (count,)))
         size = np.dtype(kinds).itemsize
     count = min(element.count, (len(data) - at) // size) if size else 0
     table = np.frombuffer(data, np.dtype(kinds), count, at)
     rows = Rows(element, count)
-    for number, each in enumerate(element.properties):
+    for number, prop in enumerate(element.properties):
         values = table[str(number)]
-        if each.length:
+        if prop.length:
             lengths = table[f"length {number}"]
             if count < element.count or (lengths != lengths[:1]).any():
                 return None
-            rows.lists[each.name] = lengths.astype(np.intp), values.ravel()
+            rows.lists[prop.name] = lengths.astype(np.intp), values.ravel()
         else:
-            rows.columns[each.name] = values[:, 0]
+            rows.columns[prop.name] = values[:, 0]
     return rows, at + count * size
 
 
-def _length(field: bytes, each: Property, order: str) -> int:
+def _length(field: bytes, prop: Property, order: str) -> int:
     """Return the length of a list from its bytes."""
-    return int.from_bytes(field, BYTE_ORDERS[order], signed=each.length[0] == "i")
+    return int.from_bytes(field, BYTE_ORDERS[order], signed=prop.length[0] == "i")
 
 
 def _unlike(element: Element, data: bytes, at: int, order: str) -> tuple[Rows, int]:
     """Return rows with lists of any lengths, and where they end."""
-    lists = [each for each in element.properties if each.length]
+    lists = [prop for prop in element.properties if prop.length]
     gaps, byteorder, end = _gaps(element.properties), BYTE_ORDERS[order], len(data)
     steps = [
-        (gap, int(each.length[1]), each.size, each.length[0] == "i")
-        for gap, each in zip(gaps, lists, strict=False)
+        (gap, int(prop.length[1]), prop.size, prop.length[0] == "i")
+        for gap, prop in zip(gaps, lists, strict=False)
     ]
-    found: list[list[int]] = [[] for _ in lists]  # where the values of each list begin
+    list_begins: list[list[int]] = [[] for _ in lists]  # where the values of each list begin
     starts: list[int] = []
     while len(starts) < element.count:
         begins, place = [], at
@@ -100,21 +100,21 @@ def _unlike(element: Element, data: bytes, at: int, order: str) -> tuple[Rows, i
         if place > end:
             break
         starts.append(at)
-        for each_found, begin in zip(found, begins, strict=True):
-            each_found.append(begin)
+        for list_begin, begin in zip(list_begins, begins, strict=True):
+            list_begin.append(begin)
         at = place
-    lists_at = [np.array(each, np.intp) for each in found]
+    lists_at = [np.array(begins, np.intp) for begins in list_begins]
     return _gathered(element, data, order, np.array(starts, np.intp), lists_at), at
 
 
 def _gaps(properties: list[Property]) -> list[int]:
     """Return the bytes of the numbers before each list, and of those after the last."""
     gaps = [0]
-    for each in properties:
-        if each.length:
+    for prop in properties:
+        if prop.length:
             gaps.append(0)
         else:
-            gaps[-1] += each.size
+            gaps[-1] += prop.size
     return gaps
 
 
@@ -123,17 +123,17 @@ def _gathered(element: Element, data: bytes, order: str, at: Ints, lists: list[I
     rows, octets, left = Rows(element, len(at)), np.frombuffer(data, np.uint8), iter(lists)
 
     def values(begin: Ints, kind: str) -> NDArray[Any]:
-        parts = octets[begin[:, None] + np.arange(int(kind[1]))]
-        return parts.view(order + kind).ravel()
+        octet_rows = octets[begin[:, None] + np.arange(int(kind[1]))]
+        return octet_rows.view(order + kind).ravel()
 
-    for each in element.properties:
-        if each.length:
+    for prop in element.properties:
+        if prop.length:
             begin = next(left)
-            counts = values(begin - int(each.length[1]), each.length).astype(np.intp)
-            at = begin + counts * each.size
-            places = np.repeat(begin, counts) + each.size * ranges(np.zeros_like(counts), counts)
-            rows.lists[each.name] = counts, values(places, each.kind)
+            counts = values(begin - int(prop.length[1]), prop.length).astype(np.intp)
+            at = begin + counts * prop.size
+            places = np.repeat(begin, counts) + prop.size * ranges(np.zeros_like(counts), counts)
+            rows.lists[prop.name] = counts, values(places, prop.kind)
         else:
-            rows.columns[each.name] = values(at, each.kind)
-            at = at + each.size
+            rows.columns[prop.name] = values(at, prop.kind)
+            at = at + prop.size
     return rows

@@ -90,11 +90,11 @@ class Entry:
         files = self.files or SceneFiles(self.file, losses=self.losses)
         try:
             instead = GRAY if key == "map_kd" else None
-            found = files.picture(image.reference, self.file, self.where(key), instead)
+            picture = files.picture(image.reference, self.file, self.where(key), instead)
         except SceneError as error:
             raise SceneError(f"{self.where(key)}: {error}") from error
-        if found is not None:
-            self.images[key] = found
+        if picture is not None:
+            self.images[key] = picture
             return
         del self.lines[key]
         if key == "map_ke":
@@ -179,11 +179,11 @@ class Entry:
     ) -> list[float]:
         """Return the numbers of an option; those that are not written are the last of `default`."""
         words = options.get(name, [])
-        found = [float(word) for word in words if NUMBER.fullmatch(word)]
-        if len(found) < len(words) or not np.isfinite(found).all():
+        values = [float(word) for word in words if NUMBER.fullmatch(word)]
+        if len(values) < len(words) or not np.isfinite(values).all():
             self.note(key, f"with {name} {' '.join(words)}", "without that option")
-            found = []
-        return found + default[len(found) :]
+            values = []
+        return values + default[len(values) :]
 
     def _placing(self, key: str, options: dict[str, list[str]]) -> Doubles | None:
         """Return the transform (3, 3) of texture coordinates by -s and -o, None without them."""

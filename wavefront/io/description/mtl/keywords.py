@@ -77,7 +77,7 @@ CHANNELS: dict[str, Any] = {"r": 0, "g": 1, "b": 2, "m": 3, "l": "luminance"}
 
 
 def keyword_of(key: str) -> Keyword:
-    """Return what stands after a keyword in lower case."""
+    """Return the declaration of a keyword in lower case."""
     return KEYWORDS.get(key, UNKNOWN)
 
 
