@@ -103,10 +103,10 @@ class DracoMesh:
     def values(self, attribute: str) -> NDArray[Any]:
         """Return the values (n, k) of an attribute as they are stored."""
         number = self._numbers[attribute]
-        found = self._mesh.get_attribute_by_unique_id(number)
-        if found is None:
+        data = self._mesh.get_attribute_by_unique_id(number)
+        if data is None:
             raise SceneError(f"{DRACO} has no attribute {number!r}, of {attribute}")
-        values = np.asarray(found["data"])
+        values = np.asarray(data["data"])
         return values.reshape(len(values), -1)
 
 

@@ -76,11 +76,11 @@ class Document:
 
     def items(self, kind: str) -> list[Any]:
         """Return the array `kind`; an empty one where it is malformed, which is noted."""
-        found = self.json.get(kind, [])
-        if not isinstance(found, list):
-            self.files.losses.note(kind, value=shown(found), done="left out, as it must be a list")
+        array = self.json.get(kind, [])
+        if not isinstance(array, list):
+            self.files.losses.note(kind, value=shown(array), done="left out, as it must be a list")
             return []
-        return found
+        return array
 
     @contextmanager
     def inside(self, element: str) -> Iterator[None]:
@@ -282,16 +282,16 @@ def _chunks(losses: Losses, data: bytes) -> tuple[bytes, bytes | None]:
         raise SceneError(f"{name}: is glTF version {version}; only version 2 is read")
     if length > len(data):
         losses.note(f"claims {plural(length, 'byte')}; it has {len(data)}", done="what is there is read")
-    parts: dict[bytes, bytes] = {}
+    chunks: dict[bytes, bytes] = {}
     at, end = 12, min(length, len(data))
     while at + 8 <= end:
         size, kind = struct.unpack_from("<I4s", data, at)
-        there = min(size, end - at - 8)
-        if there < size:
-            what = f"a chunk claims {plural(size, 'byte')}; {there} are there"
+        available = min(size, end - at - 8)
+        if available < size:
+            what = f"a chunk claims {plural(size, 'byte')}; {available} are there"
             losses.note(what, done="what is there is read")
-        parts.setdefault(kind, data[at + 8 : at + 8 + there])
+        chunks.setdefault(kind, data[at + 8 : at + 8 + available])
         at += 8 + size
-    if b"JSON" not in parts:
+    if b"JSON" not in chunks:
         raise losses.nothing("has no JSON chunk")
-    return parts[b"JSON"], parts.get(b"BIN\0")
+    return chunks[b"JSON"], chunks.get(b"BIN\0")

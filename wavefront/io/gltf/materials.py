@@ -104,8 +104,8 @@ class GltfMaterials:
         item = self._document.get("images", index)
         if index not in self._images:
             read = lambda: self._decoded(item, f"images[{index}]")  # noqa: E731
-            found = self._document.files.shown(_called(item, index), read, where, instead)
-            self._images[index] = None if found is instead else found
+            image = self._document.files.shown(_called(item, index), read, where, instead)
+            self._images[index] = None if image is instead else image
         return self._images[index] or instead
 
     def _decoded(self, item: dict[str, Any], place: str) -> StoredImage:
@@ -141,7 +141,7 @@ def _source(item: dict[str, Any]) -> Any:
 
 
 def _called(item: dict[str, Any], index: int) -> str:
-    """Return what messages call an image."""
+    """Return the name of an image in messages."""
     uri = item.get("uri")
     known = uri if isinstance(uri, str) and not uri.startswith("data:") else item.get("name")
     return f"images[{index}]" if known is None else str(known)
@@ -216,10 +216,10 @@ class _Reader:
     def _numbers(self, group: dict[str, Any], key: str, default: list[float], high: float) -> Doubles:
         """Return numbers, clamped to [0, high], or their defaults, where they are malformed."""
         place, value = f"{self._where}.{key}", group.get(key, default)
-        found = np.array(default)
+        numbers = np.array(default)
         with self._document.part(place, "the default in its place"):
-            found = floats(place, [value] if len(default) == 1 and key in group else value, len(default))
-        return self._losses.within(place, found, 0, high)
+            numbers = floats(place, [value] if len(default) == 1 and key in group else value, len(default))
+        return self._losses.within(place, numbers, 0, high)
 
     def _texture(
         self, group: dict[str, Any], key: str, instead: StoredImage | None = None, **arguments: Any

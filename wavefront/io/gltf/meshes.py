@@ -46,27 +46,27 @@ def primitives(document: Document, index: Any) -> list[Primitive]:
     mesh = document.get("meshes", index)
     with document.inside(f"meshes[{index}]"):
         name = str(mesh.get("name", f"mesh{index}"))
-        parts = mesh.get("primitives", [])
+        json_primitives = mesh.get("primitives", [])
         out = []
-        for number, part in enumerate(parts):
+        for number, primitive in enumerate(json_primitives):
             place = f"meshes[{index}].primitives[{number}]"
             with document.part(place):
-                mode = part.get("mode", TRIANGLES)
+                mode = primitive.get("mode", TRIANGLES)
                 if mode not in (TRIANGLES, STRIP, FAN):
                     document.lose("points and lines", f"mesh {name!r}")
                     continue
-                label = name if len(parts) == 1 else f"{name}_{number}"
-                out.append(_Reader(document, part, label, place).primitive(mode))
+                label = name if len(json_primitives) == 1 else f"{name}_{number}"
+                out.append(_Reader(document, primitive, label, place).primitive(mode))
         return out
 
 
 class _Reader:
     """Reads one primitive."""
 
-    def __init__(self, document: Document, part: dict[str, Any], name: str, place: str) -> None:
-        self._document, self._part, self._name, self._place = document, part, name, place
+    def __init__(self, document: Document, primitive: dict[str, Any], name: str, place: str) -> None:
+        self._document, self._json, self._name, self._place = document, primitive, name, place
         self._where = f"{document.name}: {name!r}"
-        self._attributes = part.get("attributes", {})
+        self._attributes = primitive.get("attributes", {})
         self._draco = self._unpacked()
         self._count: int | None = None  # of vertices
 
@@ -96,14 +96,14 @@ class _Reader:
             tangents=self._read("TANGENT", 4),
             colors=self._read("COLOR_0", (3, 4)),
         )
-        return Primitive(raw, self._part.get("material"), self._bend(), self._place)
+        return Primitive(raw, self._json.get("material"), self._bend(), self._place)
 
     def _unpacked(self) -> DracoMesh | None:
-        """Return what Draco compressed, None if nothing is, or if the file has it uncompressed, too."""
-        item, document = self._part.get("extensions", {}).get(DRACO), self._document
+        """Return the mesh that Draco compressed; None without one, or if it is there uncompressed, too."""
+        item, document = self._json.get("extensions", {}).get(DRACO), self._document
         if item is None:
             return None
-        plain = all("bufferView" in document.get("accessors", each) for each in self._attributes.values())
+        plain = all("bufferView" in document.get("accessors", i) for i in self._attributes.values())
         if plain and find_spec("DracoPy") is None:
             return None
         data, start, end, _ = document.view(item["bufferView"])
@@ -114,16 +114,16 @@ class _Reader:
         document, where = self._document, self._where
         if self._draco is not None:
             indices, mode = self._draco.indices, TRIANGLES
-        elif "indices" in self._part:
-            indices = document.accessor(self._part["indices"])[:, 0]
+        elif "indices" in self._json:
+            indices = document.accessor(self._json["indices"])[:, 0]
             if indices.dtype.kind != "u":
                 raise SceneError(f"{where} has indices of type {indices.dtype}; they must be unsigned")
         else:
             indices = np.arange(self._count or 0)
         beyond = len(indices) % 3 if mode == TRIANGLES else 0
         if beyond:
-            there = f"has {plural(len(indices), 'index', 'indices')}; triangles need a multiple of 3"
-            document.files.losses.note(there, f"{self._name!r}", done="the last ones are left out")
+            amount = f"has {plural(len(indices), 'index', 'indices')}; triangles need a multiple of 3"
+            document.files.losses.note(amount, f"{self._name!r}", done="the last ones are left out")
         return _triangles(where, indices[: len(indices) - beyond], mode, self._count or 0)
 
     def _values(self, key: str, widths: int | tuple[int, ...]) -> NDArray[Any] | None:
@@ -147,15 +147,15 @@ class _Reader:
     def _bend(self) -> Bend:
         """Return the morph targets and the joints; what is damaged is noted, and without effect."""
         bend, document = Bend(), self._document
-        if "targets" not in self._part and "JOINTS_0" not in self._attributes:
+        if "targets" not in self._json and "JOINTS_0" not in self._attributes:
             return bend
         with document.part(f"{self._place}.targets"):
-            bend.targets = [self._target(*each) for each in enumerate(self._part.get("targets", []))]
+            bend.targets = [self._target(*numbered) for numbered in enumerate(self._json.get("targets", []))]
         with document.part(f"{self._place}.JOINTS"):
-            sets = [each for each in range(len(self._attributes)) if f"JOINTS_{each}" in self._attributes]
-            joints = [self._values(f"JOINTS_{each}", INFLUENCES) for each in sets]
-            weights = [self._values(f"WEIGHTS_{each}", INFLUENCES) for each in sets]
-            if any(each is None for each in weights):
+            sets = [i for i in range(len(self._attributes)) if f"JOINTS_{i}" in self._attributes]
+            joints = [self._values(f"JOINTS_{i}", INFLUENCES) for i in sets]
+            weights = [self._values(f"WEIGHTS_{i}", INFLUENCES) for i in sets]
+            if any(values is None for values in weights):
                 raise SceneError("has no WEIGHTS for all of its JOINTS")
             if sets:
                 bend.joints = np.hstack(joints).astype(np.intp)  # type: ignore[arg-type]
@@ -164,15 +164,15 @@ class _Reader:
 
     def _target(self, number: int, target: dict[str, Any]) -> dict[str, Table]:
         """Return the differences of a morph target, by attribute."""
-        where, found = f"{self._where}: target {number}", {}
+        where, differences = f"{self._where}: target {number}", {}
         for key in target:
             if key not in MORPHED:
                 self._document.lose(f"{key} of morph targets", f"mesh {self._name!r}")
                 continue
             values = attribute(self._document, target, key, 3, where, self._count)
             assert values is not None
-            found[key] = wide(values)
-        return found
+            differences[key] = wide(values)
+        return differences
 
 
 def _flip_v(coordinates: Table | None) -> Table | None:
@@ -217,8 +217,8 @@ def _triangles(where: str, indices: NDArray[Any], mode: int, count: int) -> Face
     if mode == TRIANGLES:
         return indices.astype(np.intp).reshape(-1, 3)
     if len(indices) < 3:
-        there = plural(len(indices), "index", "indices")
-        raise SceneError(f"{where} has {there}; a strip or fan needs at least 3")
+        amount = plural(len(indices), "index", "indices")
+        raise SceneError(f"{where} has {amount}; a strip or fan needs at least 3")
     # glTF forbids the largest index; where it occurs, it begins a new strip, as in graphics hardware
     largest = np.iinfo(indices.dtype).max
     restart = (indices == largest) & (largest >= count)

@@ -83,11 +83,13 @@ class _Walk:
                 if index in self.seen:
                     raise SceneError("is reached twice; nodes must form a tree")
                 self.seen.add(index)
-                own = node.get("children", [])
-                if not isinstance(own, list):
-                    document.files.losses.note(f"nodes[{index}].children", value=shown(own), done="left out")
-                    own = []
-                stack += [(child, len(self.indices), depth + 1) for child in own]
+                children = node.get("children", [])
+                if not isinstance(children, list):
+                    document.files.losses.note(
+                        f"nodes[{index}].children", value=shown(children), done="left out"
+                    )
+                    children = []
+                stack += [(child, len(self.indices), depth + 1) for child in children]
                 self.indices.append(index)
                 self._found.append(node)
                 self._parents.append(parent)
@@ -101,13 +103,13 @@ class _Walk:
         if motions:
             start = min(motion.start for motion in motions.values())
             matrices[list(motions)] = Together(list(motions.values())).at(start)
-        kept = in_range(matrices)
-        for at in np.flatnonzero(~kept).tolist():
+        sound = in_range(matrices)
+        for at in np.flatnonzero(~sound).tolist():
             place = f"nodes[{self.indices[at]}]"
             self._document.files.losses.note(f"its matrix to the scene {TOO_LARGE}", place, done="left out")
         return [
             Node(self.indices[at], self._found[at], matrices[at], at < count, motions.get(at))
-            for at in np.flatnonzero(kept).tolist()
+            for at in np.flatnonzero(sound).tolist()
         ]
 
     def _motions(self, local: Matrix) -> dict[int, Motion]:
@@ -150,8 +152,10 @@ def _nodes_of(document: Document, index: Any) -> list[Any]:
 def _tops(document: Document) -> list[Any]:
     """Return the indices of the nodes that are no children."""
     nodes = document.items("nodes")
-    held = [node.get("children") for node in nodes if isinstance(node, dict)]
-    children = {child for own in held if isinstance(own, list) for child in own if isinstance(child, int)}
+    lists = [node.get("children") for node in nodes if isinstance(node, dict)]
+    children = {
+        child for group in lists if isinstance(group, list) for child in group if isinstance(child, int)
+    }
     return [index for index in range(len(nodes)) if index not in children]
 
 
@@ -183,16 +187,16 @@ def _local(document: Document, indices: list[int], nodes: list[dict[str, Any]]) 
             return table(values, width, lambda row: key)
 
     out = np.empty((len(nodes), 4, 4))
-    given = np.array(["matrix" in node for node in nodes], np.bool_)
-    at = np.flatnonzero(given)
+    has_matrix = np.array(["matrix" in node for node in nodes], np.bool_)
+    at = np.flatnonzero(has_matrix)
     out[at] = rows("matrix", IDENTITY.ravel().tolist(), 16, at).reshape(-1, 4, 4).transpose(0, 2, 1)
     for i in at[(out[at, 3] != IDENTITY[3]).any(1)].tolist():
         last = f"the last row of nodes[{indices[i]}].matrix"
         document.files.losses.note(last, value=str(out[i, 3].tolist()), done="[0, 0, 0, 1] in its place")
         out[i, 3] = IDENTITY[3]
-    at = np.flatnonzero(~given)
-    parts = (rows(name.lower(), neutral, len(neutral), at) for name, neutral in INSTANCE_ATTRIBUTES.items())
-    out[at] = composed(*parts)
+    at = np.flatnonzero(~has_matrix)
+    factors = (rows(name.lower(), neutral, len(neutral), at) for name, neutral in INSTANCE_ATTRIBUTES.items())
+    out[at] = composed(*factors)
     return out
 
 

@@ -32,7 +32,7 @@ HEIGHT = 512  # pixels of a camera's picture; files give only its aspect ratio
 
 
 def contents(document: Document, animation: str | int | bool | None) -> tuple[Contents, list[Any]]:
-    """Return what the default scene holds, and the number of each mesh's material; None for none.
+    """Return the contents of the default scene, and the number of each mesh's material, None for none.
 
     Parameters
     ----------
@@ -100,21 +100,21 @@ class _Meshes:
             If the mesh cannot be read, or there are more placements than the limits allow.
         """
         document, limits = self._document, self._document.files.limits
-        parts = self._parts(node)
+        numbers = self._parts(node)
         limits.check_meshes(document.name, len(self.raws))
-        if not parts:
+        if not numbers:
             return
-        local = self._placements(node, parts)
-        total = len(self._of) + len(local) * len(parts)
+        local = self._placements(node, numbers)
+        total = len(self._of) + len(local) * len(numbers)
         if total > limits.instances:
             most = f"{limits.instances} (LoadLimits.instances)"
             place = f"{document.name}: nodes[{node.index}]"
             raise LimitError(f"{place}: its nodes place {total} meshes so far; the limit is {most}")
-        self._of += parts * len(local)
-        self._names += _names_of_parts(node, len(parts)) * len(local)
-        where = (node.matrix @ local).repeat(len(parts), 0)
+        self._of += numbers * len(local)
+        self._names += _names_of_parts(node, len(numbers)) * len(local)
+        where = (node.matrix @ local).repeat(len(numbers), 0)
         motions = _motions(node, local)
-        by_joints = [part in self._skinned for part in parts]
+        by_joints = [number in self._skinned for number in numbers]
         if self._skinned:  # whose joints place them
             where[by_joints * len(local)] = IDENTITY
         self._where.append(where)
@@ -142,39 +142,43 @@ class _Meshes:
     def _parts(self, node: Node) -> list[int]:
         """Return the indices of a mesh's parts among `raws`; the mesh is read at its first use."""
         mesh: Any = node.json["mesh"]
-        own = (
+        own_node = (
             node.index if node.index in self._weights else None
         )  # a node whose weights move has its own mesh
-        key = repr(mesh), repr(node.json.get("skin")), repr(node.json.get("weights")), own
+        key = repr(mesh), repr(node.json.get("skin")), repr(node.json.get("weights")), own_node
         if key not in self._made:
             if not isinstance(mesh, int) or mesh not in self._primitives:
                 self._primitives[mesh] = primitives(self._document, mesh)
             first = len(self.raws)
-            self.raws += [(self._posed(node, each), each.material) for each in self._primitives[mesh]]
+            self.raws += [
+                (self._posed(node, primitive), primitive.material) for primitive in self._primitives[mesh]
+            ]
             self._made[key] = list(range(first, len(self.raws)))
             self._skinned |= {
                 first + number
-                for number, each in enumerate(self._primitives[mesh])
-                if each.bend.joints is not None and self._skin(node) is not None
+                for number, primitive in enumerate(self._primitives[mesh])
+                if primitive.bend.joints is not None and self._skin(node) is not None
             }
         return self._made[key]
 
-    def _posed(self, node: Node, part: Primitive) -> RawMesh:
+    def _posed(self, node: Node, primitive: Primitive) -> RawMesh:
         """Return the mesh of a primitive at the start of the animation, with how it deforms."""
-        document, skin, count = self._document, self._skin(node), len(part.bend.targets)
+        document, skin, count = self._document, self._skin(node), len(primitive.bend.targets)
         weights = np.zeros(count)
         if skin is None and not count:
-            return part.raw
+            return primitive.raw
         if count:
             with document.part(f"nodes[{node.index}].weights", "0 in their place"):
                 mesh = document.get("meshes", node.json["mesh"])
                 weights = target_weights(mesh, node.json, count)
-        bend = part.bend if skin is None else held(document.files.losses, part.place, part.bend, skin)
+        bend = primitive.bend
+        if skin is not None:
+            bend = held(document.files.losses, primitive.place, bend, skin)
         moving = self._weights.get(node.index) if count else None
         joints = None if skin is None else self._joints_of(node.json["skin"], skin)
         if moving is None and (joints is None or not joints.move):
-            return pose(part.raw, bend, weights, skin, self._matrices)
-        deformation = PosedMesh(part.raw, bend, weights if moving is None else moving, skin, joints)
+            return pose(primitive.raw, bend, weights, skin, self._matrices)
+        deformation = PosedMesh(primitive.raw, bend, weights if moving is None else moving, skin, joints)
         return replace(deformation.posed(deformation.start), deformation=deformation)
 
     def _joints_of(self, number: int, skin: Skin) -> Joints:
@@ -204,10 +208,10 @@ def _motions(node: Node, local: Matrix) -> list[Motion | None]:
     return [Product(node.motion, matrix) for matrix in local]
 
 
-def _names_of_parts(node: Node, parts: int) -> list[str]:
+def _names_of_parts(node: Node, count: int) -> list[str]:
     """Return the names of the shapes of a node; "" if it has none."""
     name = printable(str(node.json.get("name") or ""))
-    return [f"{name}_{part}" if name and parts > 1 else name for part in range(parts)]
+    return [f"{name}_{number}" if name and count > 1 else name for number in range(count)]
 
 
 def _add_others(document: Document, out: Contents, node: Node) -> None:
@@ -266,9 +270,9 @@ def _add_light(document: Document, out: Contents, index: Any, node: Node) -> Non
         if "range" in light:
             document.lose("range of a light", f"light {index}")
         matrix = node.matrix if node.motion is None else IDENTITY
-        found = punctual_light(light, matrix, document.files.losses, f"light {index}")
-        if found is None:
+        lamp = punctual_light(light, matrix, document.files.losses, f"light {index}")
+        if lamp is None:
             document.lose(f"{light.get('type')} light", f"light {index}")
         else:
-            found.efficacy = OF_CANDELA
-            out.lights = [*out.lights, found if node.motion is None else found.transformed(node.motion)]
+            lamp.efficacy = OF_CANDELA
+            out.lights = [*out.lights, lamp if node.motion is None else lamp.transformed(node.motion)]

@@ -144,11 +144,11 @@ def _with_common_limits(blocks: list[Any], look: Look) -> Look:
     if look.plain or look.colors is not None or coloring.clim is not None:
         return look
     arrays = [_array(block, look) for block in blocks if hasattr(block, "point_data")]
-    values = [lengths("scalars", each) for each in arrays if each is not None and each.dtype != np.uint8]
-    some = [each[np.isfinite(each)] for each in values if np.isfinite(each).any()]
+    values = [lengths("scalars", array) for array in arrays if array is not None and array.dtype != np.uint8]
+    some = [numbers[np.isfinite(numbers)] for numbers in values if np.isfinite(numbers).any()]
     if not some:
         return look
-    limits = min(each.min() for each in some), max(each.max() for each in some)
+    limits = min(finite.min() for finite in some), max(finite.max() for finite in some)
     return replace(look, coloring=replace(coloring, clim=limits))
 
 
@@ -178,9 +178,9 @@ def _of_triangles(data: Any) -> Any:
     whole = not flat.size % 4 and not (flat[::4] != 3).any()
     if whole and not getattr(data, "n_strips", 0):
         return data
-    found, starts = data.triangulate(), _starts(flat)
-    lost = flat.size - 3 * len(starts) - np.asarray(found.faces).size // 4
-    return _cut(data, flat, starts) if lost > 0 and not data.n_strips else found
+    triangles, starts = data.triangulate(), _starts(flat)
+    lost = flat.size - 3 * len(starts) - np.asarray(triangles.faces).size // 4
+    return _cut(data, flat, starts) if lost > 0 and not data.n_strips else triangles
 
 
 def _starts(flat: Ints) -> Ints:
@@ -237,7 +237,7 @@ def _mesh(data: Any, points: Table, corners: Any, look: Look) -> RawMesh:
 
 
 def _color_material(colors: Doubles, look: Look) -> Material:
-    """Return what shows colors (n, 4) of vertices, and their opacity."""
+    """Return a material that shows the colors (n, 4) of vertices, and their opacity."""
     faint = bool((colors[:, 3] < 1).any()) or look.opacity < 1
     return Material(Diffuse(VertexColors()), alpha=VertexColors(look.opacity, channel=3) if faint else None)
 
@@ -266,7 +266,7 @@ def _lines(data: Any, points: Table, lines: Any, look: Look) -> Shape:
 
 
 def _shown(data: Any, look: Look) -> Shown | None:
-    """Return what of the points or cells is shown; None for nothing."""
+    """Return the numbers or colors of points or cells that are shown; None if none are."""
     if look.plain:
         return None
     array = _array(data, look)
@@ -299,16 +299,16 @@ def _array(data: Any, look: Look) -> Any:
     """Return the array that is shown; without active scalars colors of points or cells, or None."""
     name = _name(data, look)
     if name is None:
-        found = point_colors(data.point_data)
-        found = point_colors(data.cell_data) if found is None else found
+        array = point_colors(data.point_data)
+        array = point_colors(data.cell_data) if array is None else array
     else:
-        known = {each: data.cell_data[each] for each in data.cell_data.keys()}  # noqa: SIM118
-        known |= {each: data.point_data[each] for each in data.point_data.keys()}  # noqa: SIM118
+        known = {key: data.cell_data[key] for key in data.cell_data.keys()}  # noqa: SIM118
+        known |= {key: data.point_data[key] for key in data.point_data.keys()}  # noqa: SIM118
         if name not in known:
             return (look.coloring or Coloring(name)).values(np.asarray(data.points), known)
-        found = known[name]
-    found = None if found is None else np.asarray(found)
-    return None if found is None or found.dtype.kind not in "fiub" else found
+        array = known[name]
+    array = None if array is None else np.asarray(array)
+    return None if array is None or array.dtype.kind not in "fiub" else array
 
 
 def _of_cells(data: Any, look: Look) -> bool:

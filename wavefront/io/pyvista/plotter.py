@@ -25,7 +25,7 @@ STYLES = {"wireframe": "edges", "points": "points"}
 
 
 def from_plotter(plotter: Any, smooth: bool | float | str) -> Scene:
-    """Return what a plotter shows, and its camera.
+    """Return the scene of a plotter: the shapes that it shows, and its camera.
 
     Raises
     ------
@@ -48,9 +48,9 @@ def camera_of(plotter: Any) -> Camera:
     size = int(width), int(height)
     place, middle = (camera.position, camera.focal_point, camera.up), np.array(camera.GetWindowCenter())
     if camera.parallel_projection:
-        found = Camera.orthographic(*place, height=2 * camera.parallel_scale, size=size)
+        view = Camera.orthographic(*place, height=2 * camera.parallel_scale, size=size)
         moved = middle * camera.parallel_scale * (width / height, 1)
-        return found.replace(origin=found.origin + found.rotation[:, :2] @ moved)
+        return view.replace(origin=view.origin + view.rotation[:, :2] @ moved)
     angle = math.radians(camera.view_angle)
     if camera.GetUseHorizontalViewAngle():
         angle = 2 * math.atan(math.tan(angle / 2) * size[1] / size[0])
@@ -66,11 +66,11 @@ def _shapes(name: str, actor: Any, smooth: bool | float | str, losses: Losses) -
     if not hasattr(prop, "style"):
         losses.note("volume", name, done="left out; wf.load_grid and wf.GridBox show volumes")
         return []
-    found = shapes_of(data, smooth, _look(actor, mapper, prop))
+    shapes = shapes_of(data, smooth, _look(actor, mapper, prop))
     style = STYLES.get(str(prop.style).lower())
     if prop.show_edges and style is None:
         losses.note("edges", name)
-    placed = [_styled(shape, style) for shape in found]
+    placed = [_styled(shape, style) for shape in shapes]
     matrix = _matrix(actor)
     if (matrix != np.eye(4)).any():
         placed = [shape.transformed(matrix) for shape in placed]
@@ -106,7 +106,7 @@ def _look(actor: Any, mapper: Any, prop: Any) -> Look:
     if coloring is None or table is None or str(mapper.color_mode) == "direct":
         return Look(coloring, material=material, opacity=opacity, rgb=True)
     codes = np.asarray(table.values, np.uint8)
-    no_number = tuple(round(255 * part) for part in table.GetNanColor())
+    no_number = tuple(round(255 * component) for component in table.GetNanColor())
     low, high = (float(limit) for limit in mapper.scalar_range)
     return Look(
         coloring,
@@ -117,9 +117,9 @@ def _look(actor: Any, mapper: Any, prop: Any) -> Look:
 
 
 def _material(actor: Any, prop: Any, opacity: float) -> Material:
-    """Return what an actor without scalars is made of."""
+    """Return the material of an actor without scalars."""
     texture = getattr(actor, "texture", None)
-    color: Any = srgb(*(float(part) for part in prop.color.float_rgb))
+    color: Any = srgb(*(float(component) for component in prop.color.float_rgb))
     if texture is not None and hasattr(texture, "to_array"):
         color = Texture(np.asarray(texture.to_array(), np.uint8)[..., :3])
     alpha = None if opacity == 1 else opacity

@@ -78,11 +78,11 @@ def lights(geometry: Any, losses: Losses) -> list[DirectionalLight | PointLight 
         If a light is malformed.
     """
     # reading `lights` would add default lights
-    given = getattr(geometry, "_lights", None) or []
-    if given and all(_is_made_up(light) for light in given):
+    scene_lights = getattr(geometry, "_lights", None) or []
+    if scene_lights and all(_is_made_up(light) for light in scene_lights):
         warn_caller(f"{SOURCE}: not honored: the lights that trimesh made for its viewer")
         return []
-    return [_light(geometry, light, losses) for light in given]
+    return [_light(geometry, light, losses) for light in scene_lights]
 
 
 def _light(geometry: Any, light: Any, losses: Losses) -> DirectionalLight | PointLight | SpotLight:
@@ -102,11 +102,11 @@ def _light(geometry: Any, light: Any, losses: Losses) -> DirectionalLight | Poin
         outer = min(light.outerConeAngle, np.pi / 2)
         json["spot"] = {"innerConeAngle": min(light.innerConeAngle, outer), "outerConeAngle": outer}
     try:
-        found = punctual_light(json, matrix, losses, label)
+        converted = punctual_light(json, matrix, losses, label)
     except SceneError as error:
         raise SceneError(f"{label}: {error}") from error
-    assert found is not None
-    return found
+    assert converted is not None
+    return converted
 
 
 def _is_made_up(light: Any) -> bool:

@@ -49,7 +49,7 @@ class Child:
         self._errors: IO[bytes] | None = None
 
     def call(self, name: str, seconds: float, function: Callable[..., Any], *arguments: Any) -> Any:
-        """Return what a function returns there, or raise its error.
+        """Return the value of a function that the child process calls, or raise its error.
 
         Raises
         ------
@@ -145,7 +145,7 @@ atexit.register(CHILD.close)
 
 
 def _framed(stream: IO[bytes]) -> bytes | None:
-    """Return what comes next, None at the end."""
+    """Return the next message of a stream, None at the end."""
     with suppress(OSError):
         head = stream.read(FRAME.size)
         if len(head) == FRAME.size:

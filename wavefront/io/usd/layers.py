@@ -113,19 +113,19 @@ class Layers:
         """Return the path of a file that may be read, or raise a SceneError."""
         from pxr import Ar, Sdf
 
-        own = _file_of(layer)
+        layer_file = _file_of(layer)
         name, arguments = Sdf.Layer.SplitIdentifier(path)
         outer, inner = Ar.SplitPackageRelativePathOuter(name)
-        outer = os.path.relpath(outer, os.path.dirname(own)) if os.path.isabs(outer) else outer
+        outer = os.path.relpath(outer, os.path.dirname(layer_file)) if os.path.isabs(outer) else outer
         if "#" in os.path.basename(outer):  # clips by their numbers
-            for each in _numbered(own, outer):
-                self._await(str(self._files.named(each, own)))
+            for clip in _numbered(layer_file, outer):
+                self._await(str(self._files.named(clip, layer_file)))
             return path
-        found = self._files.named(outer, own)
-        if not os.path.exists(found):
-            raise SceneError(f"{own}: refers to {path!r}, which is missing")
-        self._count(found)
-        target = f"{found}[{inner}]" if inner else str(found)
+        target_file = self._files.named(outer, layer_file)
+        if not os.path.exists(target_file):
+            raise SceneError(f"{layer_file}: refers to {path!r}, which is missing")
+        self._count(target_file)
+        target = f"{target_file}[{inner}]" if inner else str(target_file)
         self._await(target)
         return Sdf.Layer.CreateIdentifier(target, arguments) if arguments else target
 
@@ -208,10 +208,10 @@ def _file_of(layer: Any) -> str:
     return str(layer.realPath or layer.identifier).partition("[")[0]
 
 
-def _numbered(own: str, name: str) -> list[str]:
+def _numbered(layer_file: str, name: str) -> list[str]:
     """Return the files of which # in a name, relative to a layer's, stands for digits."""
     folder, base = os.path.split(name)
     pattern = re.compile(re.sub(r"(\\#)+", r"\\d+", re.escape(base)))
-    there = Path(own).parent / folder
-    found = sorted(os.listdir(there)) if there.is_dir() else []
-    return [os.path.join(folder, each) for each in found if pattern.fullmatch(each)]
+    directory = Path(layer_file).parent / folder
+    names = sorted(os.listdir(directory)) if directory.is_dir() else []
+    return [os.path.join(folder, entry) for entry in names if pattern.fullmatch(entry)]

@@ -91,8 +91,8 @@ class Materials:
         from pxr import UsdShade
 
         binding = UsdShade.MaterialBindingAPI(prim)
-        found = (binding.ComputeBoundMaterial(purpose)[0] for purpose in PURPOSES)
-        bound = next((each for each in found if each), None)
+        materials = (binding.ComputeBoundMaterial(purpose)[0] for purpose in PURPOSES)
+        bound = next((material for material in materials if material), None)
         if bound is None:
             return self._none
         path = str(bound.GetPath())
@@ -108,7 +108,7 @@ class Materials:
         """Return the material of an instance of the mesh of a prim, which has values of its own."""
         look = self.of(prim)
         if look.material is not None:
-            read = [name for each, name in look.primvars.items() if each in ("colors", OPACITY)]
+            read = [name for field, name in look.primvars.items() if field in ("colors", OPACITY)]
             return self.of(prim, {name: tint[name] for name in read if name in tint}).material
         return self.plain(tint, raw.colors is not None, raw.colors is not None and raw.colors.shape[1] == 4)
 
@@ -144,11 +144,11 @@ class Materials:
         return self._images[name]
 
     def _read(self, file: Any, place: str) -> StoredImage | None:
-        found = file.resolvedPath
-        if found.endswith("]"):  # in a usdz archive
-            read = lambda: self.files.decoded(found[:-1], self._member(found))  # noqa: E731
+        path = file.resolvedPath
+        if path.endswith("]"):  # in a usdz archive
+            read = lambda: self.files.decoded(path[:-1], self._member(path))  # noqa: E731
             return self.files.shown(file.path, read, place)
-        return self.files.picture(self._inside(found) if found else file.path, place=place)
+        return self.files.picture(self._inside(path) if path else file.path, place=place)
 
     def _inside(self, path: str) -> str:
         """Return a path as the scene would refer to it."""
@@ -245,11 +245,11 @@ class _Surface:
         return _scaled(row, value) if row.is_color else float(value) * row.times
 
     def _connected(self, row: Parameter, source: Any, output: str) -> Any:
-        """Return what an output of another shader gives to an input."""
+        """Return the value of an input that is connected to an output of another shader."""
         kind = _kind(source)
-        given = self.tint.get(str(self._get(source, "varname", ""))) if "PrimvarReader" in kind else None
-        if given is not None and row is not NORMAL:
-            values = _scaled(row, given)
+        tint = self.tint.get(str(self._get(source, "varname", ""))) if "PrimvarReader" in kind else None
+        if tint is not None and row is not NORMAL:
+            values = _scaled(row, tint)
             return values if row.is_color and len(values) == 3 else row.default if row.is_color else values[0]
         plain = row.is_color and row is not NORMAL and row.times == 1
         if kind.startswith("UsdPrimvarReader_float3") and plain:
@@ -275,7 +275,7 @@ class _Surface:
         for wrap in set(wraps) - WRAPS.keys():
             self.lose(source.GetPrim(), f"wrap {wrap!r}; 'clamp' in its place")
         channel = None if row.is_color else CHANNELS.get(output, 0)
-        part = slice(0, 3) if row.is_color else channel
+        channels = slice(0, 3) if row.is_color else channel
         transform, field = self._coordinates(source)
         data = row is NORMAL
         return Texture(
@@ -284,13 +284,13 @@ class _Surface:
             wrap=tuple(WRAPS.get(wrap, "clamp") for wrap in wraps),  # type: ignore[arg-type]
             transform=transform,
             channel=channel,
-            scale=1.0 if data else np.asarray(scale, float)[part] * row.times,
-            offset=0.0 if data else np.asarray(bias, float)[part] * row.times,
+            scale=1.0 if data else np.asarray(scale, float)[channels] * row.times,
+            offset=0.0 if data else np.asarray(bias, float)[channels] * row.times,
             uv_set=COORDINATES.index(field),  # type: ignore[arg-type]
         )
 
     def _fallback(self, row: Parameter, source: Any, output: str) -> Any:
-        """Return what a texture has in place of an image that cannot be read."""
+        """Return the fallback of a texture, in place of an image that cannot be read."""
         value = self._get(source, "fallback")
         if value is None or row is NORMAL:
             return row.default
@@ -331,22 +331,22 @@ class _Surface:
     def _primvar(self, reader: Any, fields: tuple[str, ...]) -> str | None:
         """Return the field of a mesh that a primvar becomes, which a shader reads; None if all are taken."""
         name = str(self._get(reader, "varname", ""))
-        found = self._field(name, fields) if name else None
+        field = self._field(name, fields) if name else None
         if not name:
             self.lose(reader.GetPrim(), "its varname, which is empty")
-        elif found is None:
+        elif field is None:
             self.lose(reader.GetPrim(), f"the primvar {name!r}, as there are {len(fields)} before it")
         fallback = self._get(reader, "fallback")
-        if found is not None and fallback is not None:
-            self.fallbacks.setdefault(found, fallback)
-        return found
+        if field is not None and fallback is not None:
+            self.fallbacks.setdefault(field, fallback)
+        return field
 
     def _field(self, name: str, fields: tuple[str, ...]) -> str | None:
-        return next((each for each in fields if self.primvars.setdefault(each, name) == name), None)
+        return next((field for field in fields if self.primvars.setdefault(field, name) == name), None)
 
 
 def _scaled(row: Parameter, values: Any) -> tuple[float, ...]:
-    return tuple(float(each) * row.times for each in values)
+    return tuple(float(value) * row.times for value in values)
 
 
 def _kind(shader: Any) -> str:
@@ -358,11 +358,11 @@ def _shader_of(shader: Any, name: str) -> Any:
     from pxr import UsdShade
 
     sources = _sources(shader, name)
-    found = UsdShade.Shader(sources[0].GetPrim()) if sources else None
-    return found if found and UsdShade.Output.IsOutput(sources[0]) else None
+    source = UsdShade.Shader(sources[0].GetPrim()) if sources else None
+    return source if source and UsdShade.Output.IsOutput(sources[0]) else None
 
 
 def _sources(shader: Any, name: str) -> Any:
     """Return the attributes that give the value of an input."""
-    given = shader.GetInput(name)
-    return given.GetValueProducingAttributes() if given else []
+    shader_input = shader.GetInput(name)
+    return shader_input.GetValueProducingAttributes() if shader_input else []

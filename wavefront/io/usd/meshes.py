@@ -42,11 +42,11 @@ class _Triangles:
 
     def by_point(self, chosen: Any) -> tuple[Any, dict[str, Any]]:
         """Return the same with a vertex for each point that they use."""
-        faces, there = self.point[chosen], np.zeros(len(self.points), np.bool_)
-        there[faces] = True
-        used = np.flatnonzero(there)
-        if len(used) < len(there):
-            faces = (np.cumsum(there) - 1)[faces]
+        faces, is_used = self.point[chosen], np.zeros(len(self.points), np.bool_)
+        is_used[faces] = True
+        used = np.flatnonzero(is_used)
+        if len(used) < len(is_used):
+            faces = (np.cumsum(is_used) - 1)[faces]
         return faces, {"vertex": used, "varying": used, "constant": np.zeros_like(used)}
 
 
@@ -67,10 +67,10 @@ class Meshes:
 
     def one(self, prim: Any, name: str, field: str) -> Any:
         """Return a value (w,) of a primvar for all of a prim, None if it has none."""
-        given = self._primvar(prim, name, WIDTHS[field])
-        if given is not None and len(given[0]) > 1:
-            self.lose(prim, f"primvars:{name} of {len(given[0])} values; the first one in their place")
-        return None if given is None else given[0][0]
+        primvar = self._primvar(prim, name, WIDTHS[field])
+        if primvar is not None and len(primvar[0]) > 1:
+            self.lose(prim, f"primvars:{name} of {len(primvar[0])} values; the first one in their place")
+        return None if primvar is None else primvar[0][0]
 
     def _solid(self, prim: Any) -> RawMesh:
         """Return the mesh of a prim that is no mesh."""
@@ -94,24 +94,30 @@ class Meshes:
 
         mesh = self._triangles(prim)
         left = np.ones(len(mesh.face), bool)
-        parts = []
+        subsets = []
         for subset in UsdShade.MaterialBindingAPI(prim).GetMaterialBindSubsets():
             chosen = np.isin(mesh.face, np.asarray(subset.GetIndicesAttr().Get(self.time) or [], int)) & left
             left &= ~chosen
-            parts.append((subset.GetPrim(), chosen))
+            subsets.append((subset.GetPrim(), chosen))
         return [
-            (each, self._part(mesh, each, chosen)) for each, chosen in [*parts, (prim, left)] if chosen.any()
+            (look_prim, self._part(mesh, look_prim, chosen))
+            for look_prim, chosen in [*subsets, (prim, left)]
+            if chosen.any()
         ]
 
     def _part(self, mesh: _Triangles, prim: Any, chosen: Any) -> RawMesh:
         """Return the chosen triangles of a mesh, with the look of a prim: that of the mesh or of a subset."""
         look = self.materials.of(prim)
-        given = self._primvars(mesh.prim, look)
+        primvars = self._primvars(mesh.prim, look)
         most = {kind: rows.max(initial=-1) for kind, rows in mesh.by_corner(chosen)[1].items()}
-        given = {field: each for field, each in given.items() if self._fits(mesh.prim, field, *each, most)}
-        by_corner = any(kind in ("uniform", "faceVarying") for *_, kind in given.values())
+        primvars = {
+            field: primvar
+            for field, primvar in primvars.items()
+            if self._fits(mesh.prim, field, *primvar, most)
+        }
+        by_corner = any(kind in ("uniform", "faceVarying") for *_, kind in primvars.values())
         faces, index = mesh.by_corner(chosen) if by_corner else mesh.by_point(chosen)
-        values = {field: table[index[kind]] for field, (_, table, kind) in given.items()}
+        values = {field: table[index[kind]] for field, (_, table, kind) in primvars.items()}
         raw = RawMesh(
             str(prim.GetName()), mesh.points[index["vertex"]], faces, **_fields(values), smooth=True
         )
@@ -132,17 +138,17 @@ class Meshes:
         usual = {"normals": "normals", "uvs": self._first_coordinates(prim)}
         if look.material is None:
             usual |= {"colors": "displayColor", OPACITY: "displayOpacity"}
-        found = {}
+        primvars = {}
         for field, name in (usual | look.primvars).items():
             if name in self._without:
                 continue
             width = WIDTHS[field]
-            given = self._primvar(prim, name, width)
-            if given is None and field in look.primvars:
-                given = self._instead(prim, field, look), "constant"
-            if given is not None:
-                found[field] = name, *given
-        return found
+            primvar = self._primvar(prim, name, width)
+            if primvar is None and field in look.primvars:
+                primvar = self._instead(prim, field, look), "constant"
+            if primvar is not None:
+                primvars[field] = name, *primvar
+        return primvars
 
     def _instead(self, prim: Any, field: str, look: Look) -> Any:
         """Return a row for a primvar that a mesh lacks: the fallback of its reader, or else zeros."""
@@ -183,8 +189,8 @@ class Meshes:
         corners = corners[: ends[-1]] if fit else corners[:0]
         small = counts < 3
         if small.any():
-            found = f"faceVertexCounts has {plural(int(small.sum()), 'face')} of less than 3 corners"
-            self.lose(prim, found, "left out")
+            small_faces = f"faceVertexCounts has {plural(int(small.sum()), 'face')} of less than 3 corners"
+            self.lose(prim, small_faces, "left out")
         beyond = (corners < 0) | (corners >= points)
         bad = np.unique(np.searchsorted(ends, np.flatnonzero(beyond), "right"))
         if len(bad):
@@ -205,17 +211,19 @@ class Meshes:
         """Return the name of the texture coordinates of a mesh whose material reads none."""
         from pxr import UsdGeom
 
-        found = UsdGeom.PrimvarsAPI(prim).GetPrimvarsWithValues()
-        names = [each.GetPrimvarName() for each in found if str(each.GetTypeName()) == "texCoord2f[]"]
+        primvars = UsdGeom.PrimvarsAPI(prim).GetPrimvarsWithValues()
+        names = [
+            primvar.GetPrimvarName() for primvar in primvars if str(primvar.GetTypeName()) == "texCoord2f[]"
+        ]
         return "st" if "st" in names or not names else str(names[0])
 
     def _primvar(self, prim: Any, name: str, width: int) -> tuple[Any, str] | None:
         """Return the values (n, width) of a primvar and its interpolation, None if there is none."""
         from pxr import UsdGeom
 
-        given = UsdGeom.PrimvarsAPI(prim).FindPrimvarWithInheritance(name)
-        if given and given.HasValue():
-            values, kind = given.ComputeFlattened(self.time), str(given.GetInterpolation())
+        primvar = UsdGeom.PrimvarsAPI(prim).FindPrimvarWithInheritance(name)
+        if primvar and primvar.HasValue():
+            values, kind = primvar.ComputeFlattened(self.time), str(primvar.GetInterpolation())
         else:
             values = value_of(prim, self.time, name) if name == "normals" else None
             kind = str(UsdGeom.Mesh(prim).GetNormalsInterpolation())

@@ -57,12 +57,12 @@ def read_usd(files: SceneFiles, time: float | None = None) -> Contents:
     except ImportError as error:
         raise SceneError(f"{name}: files of USD need usd-core: pip install usd-core") from error
     arguments = name, files.search_paths, files.limits, time
-    found: _Found = CHILD.call(name, files.limits.seconds, _in_child, *arguments)
-    files.losses.take(found.losses, found.notices)
-    if found.error is not None:
-        raise found.error
-    assert found.contents is not None
-    return found.contents
+    reply: _Found = CHILD.call(name, files.limits.seconds, _in_child, *arguments)
+    files.losses.take(reply.losses, reply.notices)
+    if reply.error is not None:
+        raise reply.error
+    assert reply.contents is not None
+    return reply.contents
 
 
 @dataclass
@@ -74,7 +74,7 @@ class _Found:
 
 
 def _in_child(name: str, search_paths: tuple[Path, ...], limits: LoadLimits, time: float | None) -> _Found:
-    """Return what a file holds, within the limits of its load."""
+    """Return the contents of a file, within the limits of its load."""
     from pxr import Pcp, Usd, UsdGeom, UsdLux, UsdShade, UsdSkel, UsdUtils  # noqa: F401 (they are not in the limit)
 
     files = SceneFiles(name, search_paths, limits)
@@ -96,10 +96,10 @@ def _heard(losses: Losses) -> Iterator[None]:
 
     delegate = UsdUtils.CoalescingDiagnosticDelegate()
     yield
-    for each in delegate.TakeUncoalescedDiagnostics():
+    for diagnostic in delegate.TakeUncoalescedDiagnostics():
         with suppress(UnicodeDecodeError):
-            if "_ReportErrors" not in each.sourceFunction:
-                losses.note(said(each.commentary), "usd-core", done="")
+            if "_ReportErrors" not in diagnostic.sourceFunction:
+                losses.note(said(diagnostic.commentary), "usd-core", done="")
 
 
 def _read(files: SceneFiles, time: float | None) -> Contents:
@@ -126,7 +126,7 @@ def _time_codes(stage: Any) -> tuple[float, float] | None:
     """Return the first and the last time code of a stage; None where nothing changes."""
     from pxr import Usd
 
-    ranges = [stage.Traverse(), *(Usd.PrimRange(each) for each in stage.GetPrototypes())]
+    ranges = [stage.Traverse(), *(Usd.PrimRange(prototype) for prototype in stage.GetPrototypes())]
     varying = [
         attribute
         for prims in ranges
@@ -178,7 +178,7 @@ class _Reader:
             yield
 
     def contents(self) -> Contents:
-        """Return what the stage holds."""
+        """Return the contents of the stage."""
         from pxr import UsdGeom
 
         self.unit = meters(
@@ -192,12 +192,12 @@ class _Reader:
         self._place(self.stage.GetPseudoRoot(), self.root[None], {})
         counts = [len(matrices) for _, matrices, _ in self.placed]
         numbers = np.repeat(np.array([index for index, *_ in self.placed], np.intp), counts)
-        matrices = np.concatenate([np.zeros((0, 4, 4)), *(each for _, each, _ in self.placed)])
+        matrices = np.concatenate([np.zeros((0, 4, 4)), *(transforms for _, transforms, _ in self.placed)])
         materials = [made for *_, made in self.placed]
         places = Places(numbers, matrices)
         if any(made is not None for made in materials):
-            parts = zip(materials, counts, strict=True)
-            places.materials = [made for made, count in parts for _ in range(count)]
+            counted = zip(materials, counts, strict=True)
+            places.materials = [made for made, count in counted for _ in range(count)]
         up = str(UsdGeom.GetStageUpAxis(self.stage)).lower()
         span = None if self.codes is None else (self.codes[0] / self.rate, self.codes[1] / self.rate)
         return Contents(self.raws, places, self.lights, self.camera, self.shapes, up=up, span=span)
@@ -227,13 +227,16 @@ class _Reader:
         return self._sizes[key]
 
     def _count_prototypes(self, prim: Any, above: tuple[str, ...]) -> int:
-        """Return how much an instancer places; what is damaged, or would place itself, is left out."""
+        """Return the number of prims that an instancer places.
+
+        A prototype that is damaged, or would place the instancer itself, is left out.
+        """
         count, sound = 0, []
         with self.part(prim):
-            for each in self._prototypes(prim):
+            for prototype in self._prototypes(prim):
                 with self.part(prim):
-                    count += len(each.matrices) * self._count(each.prim, above)
-                    sound.append(each)
+                    count += len(prototype.matrices) * self._count(prototype.prim, above)
+                    sound.append(prototype)
         self._instancers[str(prim.GetPath())] = sound
         return count
 
@@ -251,20 +254,20 @@ class _Reader:
                     self._read(prim, kind, at[fit], tint)
 
     def _leaves(self, top: Any) -> list[tuple[Any, str, Matrix, bool]]:
-        """Return what is to be read of a prim and all below it, found once."""
+        """Return the leaves of a prim, found once."""
         key = str(top.GetPath())
         if key not in self._found:
             self._found[key] = self._find_leaves(top)
         return self._found[key]
 
     def _find_leaves(self, top: Any) -> list[tuple[Any, str, Matrix, bool]]:
-        """Return what is to be read of a prim and all below it.
+        """Return the leaves of a prim: itself and all below it, as far as they are shown.
 
         Each has its type, the matrix to the space around the prim, and whether it is that to the stage.
         """
         from pxr import Usd
 
-        found = []
+        leaves = []
         waiting, count = [(top, np.eye(4), False)], 0
         while waiting:
             prim, above, resets = waiting.pop()
@@ -275,17 +278,17 @@ class _Reader:
                 continue
             if self._value(prim, "purpose") in ("proxy", "guide"):
                 continue
-            own, alone = np.eye(4), False
+            local, alone = np.eye(4), False
             with self.part(prim, "its transform left out"):
-                own, alone = self.cache.GetLocalTransformation(prim)
-            below = (np.eye(4) if alone else above) @ np.array(own).T
+                local, alone = self.cache.GetLocalTransformation(prim)
+            below = (np.eye(4) if alone else above) @ np.array(local).T
             kind = str(prim.GetTypeName())
             if kind not in HARMLESS:
-                found.append((prim, kind, below, alone or resets))
+                leaves.append((prim, kind, below, alone or resets))
             if kind != "PointInstancer":
                 children = prim.GetFilteredChildren(Usd.TraverseInstanceProxies())
                 waiting += [(child, below, alone or resets) for child in reversed(children)]
-        return found
+        return leaves
 
     def _read(self, prim: Any, kind: str, matrices: Matrix, tint: Tint) -> None:
         """Read a prim at each of its places (n, 4, 4)."""
@@ -321,23 +324,23 @@ class _Reader:
         return Sphere(matrix[:3, 3], radius, material=material, emission=look.emission, name=name)
 
     def _plain(self, prim: Any, tint: Tint) -> Material | None:
-        """Return the material of what has none but a color and an opacity, None if it has not even these."""
-        own = dict(tint)
+        """Return the material of a prim by its color and opacity alone, None if it has neither."""
+        values = dict(tint)
         for name, field in (("displayColor", "colors"), ("displayOpacity", OPACITY)):
             value = self.meshes.one(prim, name, field)
             if value is not None:
-                own[name] = tuple(value.tolist())
-        return self.materials.plain(own, colored=False, veiled=False) if own else None
+                values[name] = tuple(value.tolist())
+        return self.materials.plain(values, colored=False, veiled=False) if values else None
 
     def _value(self, prim: Any, name: str, default: Any = None) -> Any:
         return value_of(prim, self.time, name, default)
 
     def _instancer(self, prim: Any, matrix: Matrix, tint: Tint) -> None:
-        for each in self._prototypes(prim):
-            self._place(each.prim, matrix @ each.matrices, tint | each.tint)
+        for prototype in self._prototypes(prim):
+            self._place(prototype.prim, matrix @ prototype.matrices, tint | prototype.tint)
 
     def _prototypes(self, prim: Any) -> list[_Prototype]:
-        """Return what an instancer places."""
+        """Return the prototypes of an instancer, with their places."""
         key = str(prim.GetPath())
         if key not in self._instancers:
             self._instancers[key] = list(self._read_prototypes(prim))
@@ -349,17 +352,17 @@ class _Reader:
         instancer = UsdGeom.PointInstancer(prim)
         prototypes = instancer.GetPrototypesRel().GetForwardedTargets()
         which = self._value(prim, "protoIndices", [])
-        found = instancer.ComputeInstanceTransformsAtTime(
+        transforms = instancer.ComputeInstanceTransformsAtTime(
             self.time, self.time, UsdGeom.PointInstancer.ExcludeProtoXform
         )
         which = np.asarray(which, np.intp)
         numbers = np.arange(len(which))
-        if len(found) != len(which):  # by a mask, or as the arrays differ
+        if len(transforms) != len(which):  # by a mask, or as the arrays differ
             mask = np.asarray(instancer.ComputeMaskAtTime(self.time), bool)
             numbers = numbers[mask] if len(mask) == len(which) else numbers
-        if len(numbers) != len(found):
-            raise SceneError(f"has {len(which)} protoIndices and {len(found)} positions")
-        matrices = np.array(found, float).reshape(-1, 4, 4).transpose(0, 2, 1)
+        if len(numbers) != len(transforms):
+            raise SceneError(f"has {len(which)} protoIndices and {len(transforms)} positions")
+        matrices = np.array(transforms, float).reshape(-1, 4, 4).transpose(0, 2, 1)
         groups = grouped(prim, self.time, len(which), numbers, self.lose)
         which = which[numbers]
         bad = which[(which < 0) | (which >= len(prototypes))]
@@ -370,10 +373,10 @@ class _Reader:
             if not target or prim.GetPath().HasPrefix(target.GetPath()):
                 self.lose(prim, f"its prototype {prototypes[index]} cannot be placed", "left out")
                 continue
-            for tint, part in groups:
-                own = part[which[part] == index]
-                if len(own):
-                    yield _Prototype(target, matrices[own], tint)
+            for tint, members in groups:
+                chosen = members[which[members] == index]
+                if len(chosen):
+                    yield _Prototype(target, matrices[chosen], tint)
 
     def _place_meshes(self, prim: Any, matrices: Matrix, tint: Tint) -> None:
         """Place the meshes of a prim, which may have values of primvars from its instance."""
@@ -381,14 +384,14 @@ class _Reader:
             self._place_lights(prim, matrices)
             return
         look = self.materials.of(prim)
-        own = {name: value for name, value in tint.items() if not has_own(prim, name)}
+        values = {name: value for name, value in tint.items() if not has_own(prim, name)}
         read = (name for field, name in look.primvars.items() if field in ("colors", OPACITY))
         for name in (*DISPLAYED, *read):
             value = outside(prim, name, self.time)
             if value is not None:
-                own[name] = value
-        for index, bound in self._meshes(prim, frozenset(own)):
-            material = self.materials.tinted(bound, self.raws[index], own) if own else None
+                values[name] = value
+        for index, bound in self._meshes(prim, frozenset(values)):
+            material = self.materials.tinted(bound, self.raws[index], values) if values else None
             self.placed.append((index, matrices, material))
 
     def _place_lights(self, prim: Any, matrices: Matrix) -> None:

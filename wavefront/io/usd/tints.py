@@ -20,10 +20,10 @@ def outside(prim: Any, name: str, time: Any) -> tuple[float, ...] | None:
 
     if not prim.IsInstanceProxy():
         return None
-    given = UsdGeom.PrimvarsAPI(prim).FindPrimvarWithInheritance(name)
-    if not given or given.GetAttr().GetPrim().IsInstanceProxy():
+    primvar = UsdGeom.PrimvarsAPI(prim).FindPrimvarWithInheritance(name)
+    if not primvar or primvar.GetAttr().GetPrim().IsInstanceProxy():
         return None
-    values = np.asarray(given.ComputeFlattened(time), float)
+    values = np.asarray(primvar.ComputeFlattened(time), float)
     return tuple(np.ravel(values[0]).tolist()) if values.ndim and len(values) else None
 
 
@@ -31,8 +31,8 @@ def has_own(prim: Any, name: str) -> bool:
     """Return whether a prim has a primvar, perhaps from above."""
     from pxr import UsdGeom
 
-    given = UsdGeom.PrimvarsAPI(prim).FindPrimvarWithInheritance(name)
-    return bool(given) and given.HasValue()
+    primvar = UsdGeom.PrimvarsAPI(prim).FindPrimvarWithInheritance(name)
+    return bool(primvar) and primvar.HasValue()
 
 
 def grouped(
@@ -55,8 +55,8 @@ def grouped(
 
     names, columns = [], []
     for name, width in DISPLAYED.items():
-        given = UsdGeom.PrimvarsAPI(prim).GetPrimvar(name)
-        values = given.ComputeFlattened(time) if given and given.HasValue() else None
+        primvar = UsdGeom.PrimvarsAPI(prim).GetPrimvar(name)
+        values = primvar.ComputeFlattened(time) if primvar and primvar.HasValue() else None
         if values is None:
             continue
         table = np.asarray(values, float).reshape(len(values), -1)[:, :width]
@@ -71,8 +71,8 @@ def grouped(
         return [({}, np.arange(len(shown)))]
     rows, group = np.unique(np.hstack(columns), axis=0, return_inverse=True)
     order = np.argsort(group.ravel(), kind="stable")
-    parts = np.split(order, np.cumsum(np.bincount(group.ravel()))[:-1])
-    return [(_named(names, row), part) for row, part in zip(rows.tolist(), parts, strict=True)]
+    groups = np.split(order, np.cumsum(np.bincount(group.ravel()))[:-1])
+    return [(_named(names, row), members) for row, members in zip(rows.tolist(), groups, strict=True)]
 
 
 def _named(names: list[str], row: list[float]) -> Tint:
