@@ -12,17 +12,17 @@ from ..repair import RawMesh, with_face_colors
 def with_attribute(name: str, raw: RawMesh, entity: Entity) -> RawMesh:
     """Return a mesh whose colors are the attribute that the textures of its shape show."""
     wanted = sorted(_shown(entity))
-    there = [each for each in wanted if each in raw.attributes]
-    for each in wanted:
-        if each not in there[:1]:
-            entity.lose(f"the attribute {each!r}")
-    if not there:
+    available = [attribute for attribute in wanted if attribute in raw.attributes]
+    for attribute in wanted:
+        if attribute not in available[:1]:
+            entity.lose(f"the attribute {attribute!r}")
+    if not available:
         return raw
-    values = raw.attributes[there[0]]
+    values = raw.attributes[available[0]]
     rgba = np.hstack([values if values.shape[1] == 3 else np.repeat(values, 3, 1), np.ones((len(values), 1))])
-    if there[0].startswith("face_"):
+    if available[0].startswith("face_"):
         if len(rgba) != len(raw.faces):
-            raise SceneError(f"{name}: has {len(rgba)} rows of {there[0]} and {len(raw.faces)} triangles")
+            raise SceneError(f"{name}: has {len(rgba)} rows of {available[0]} and {len(raw.faces)} triangles")
         return with_face_colors(raw, rgba)
     raw.colors = rgba
     return raw

@@ -85,7 +85,7 @@ def _conductor(entity: Entity) -> Material:
     if "eta" in entity.values or name == "none":
         if entity.type == "conductor" and "eta" not in entity.values:
             return _named(entity, Mirror(tint))
-        eta, k = (color(entity, each, to, "unbounded") for each, to in (("eta", 0.0), ("k", 1.0)))
+        eta, k = (color(entity, parameter, to, "unbounded") for parameter, to in (("eta", 0.0), ("k", 1.0)))
         k = at_least(k, 0)
     else:
         base = name.removesuffix("_palik") if name not in METALS else name
@@ -142,15 +142,15 @@ def _filter(entity: Entity) -> Material:
 
 @plugin("blendbsdf", "bsdf", "weight", holds="bsdf texture")
 def _blend(entity: Entity) -> Material:
-    parts = entity.held("bsdf")
-    if len(parts) != 2:
-        raise SceneError(f"holds {len(parts)} bsdfs; it needs two")
-    first, second = (_inner(part) for part in parts)
-    for part in (first, second):
-        if part.alpha is not None or part.normal_map is not None:
+    bsdfs = entity.held("bsdf")
+    if len(bsdfs) != 2:
+        raise SceneError(f"holds {len(bsdfs)} bsdfs; it needs two")
+    first, second = (_inner(bsdf) for bsdf in bsdfs)
+    for material in (first, second):
+        if material.alpha is not None or material.normal_map is not None:
             entity.lose("the mask or the normal map of a bsdf in it")
-    one, two = [first.bsdf, second.bsdf] if is_one_sided(entity) else [_sided(part) for part in parts]
-    return _named(entity, Mix(one, two, scalar(entity, "weight", 0.5)))
+    lobes = [first.bsdf, second.bsdf] if is_one_sided(entity) else [_sided(bsdf) for bsdf in bsdfs]
+    return _named(entity, Mix(lobes[0], lobes[1], scalar(entity, "weight", 0.5)))
 
 
 @plugin("bumpmap", "bsdf", f"scale {MAPPED}", holds="bsdf texture", note="nearest texels have no slopes")
@@ -241,8 +241,8 @@ def _index_of_reflectance(entity: Entity) -> dict[str, Any]:
     """Return the index by specular, which is the normal reflectance over 0.08, where there is no eta."""
     if "eta" in entity.values:
         return {}
-    part = entity.number("specular", 0.5, Limit(lambda x: 0 <= x <= 1, "in [0, 1]"))
-    root = np.sqrt(0.08 * part)
+    specular = entity.number("specular", 0.5, Limit(lambda x: 0 <= x <= 1, "in [0, 1]"))
+    root = np.sqrt(0.08 * specular)
     return {"ior": float((1 + root) / (1 - root))}
 
 
@@ -268,18 +268,18 @@ def _model(
     """Put a BSDF into the table of plugins; words are `ours=theirs:default`, or `name:default`."""
 
     def split(words: str) -> list[tuple[str, str, float]]:
-        parts = [word.partition(":") for word in words.split()]
-        return [(names.partition("=")[0], names.rpartition("=")[2], float(to)) for names, _, to in parts]
+        partitions = [word.partition(":") for word in words.split()]
+        return [(names.partition("=")[0], names.rpartition("=")[2], float(to)) for names, _, to in partitions]
 
     def convert(entity: Entity) -> Material:
-        found = {ours: color(entity, theirs, default) for ours, theirs, default in split(colors)}
-        found |= {
+        arguments = {ours: color(entity, theirs, default) for ours, theirs, default in split(colors)}
+        arguments |= {
             ours: scalar(entity, theirs, default, "unbounded" if theirs == "diff_trans" else "albedo")
             for ours, theirs, default in split(numbers)
         }
-        for each in others.split():
-            found |= OTHERS[each](entity) if each in OTHERS else {}
-        return _named(entity, make(**found))
+        for other in others.split():
+            arguments |= OTHERS[other](entity) if other in OTHERS else {}
+        return _named(entity, make(**arguments))
 
     read = [theirs for _, theirs, _ in split(f"{colors} {numbers}")]
     plugin(name, "bsdf", f"{' '.join(read)} {others}", harmless=harmless, note=note)(convert)
@@ -331,7 +331,7 @@ _model(
 def is_one_sided(entity: Entity) -> bool:
     """Return whether the back of a BSDF is black."""
     if entity.type in ("mask", "bumpmap", "normalmap", "blendbsdf"):
-        return all(is_one_sided(part) for part in entity.held("bsdf"))
+        return all(is_one_sided(child) for child in entity.held("bsdf"))
     if entity.type == "principled":
         passing = entity.values.get("spec_trans", 0.0)
         return isinstance(passing, int | float) and passing == 0

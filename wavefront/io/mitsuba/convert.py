@@ -30,7 +30,7 @@ def convert(
     read_mesh: Callable[[Path], list[RawMesh]],
     version: str = "",
 ) -> Contents:
-    """Return what a dictionary holds.
+    """Return the contents of a scene in a dictionary.
 
     Parameters
     ----------
@@ -64,14 +64,14 @@ DEFINED = "bsdf texture sampler film rfilter medium phase volume"  # for others 
 @plugin("scene", "scene", "", f"shape emitter sensor integrator {DEFINED}", "allow_thread_reordering")
 def _scene(entity: Entity) -> Contents:
     job = entity.job
-    parts = [part for part in entity.held("shape") if part.type != "shapegroup"]
-    seen = _sensors(entity, parts)
+    entities = [child for child in entity.held("shape") if child.type != "shapegroup"]
+    seen = _sensors(entity, entities)
     camera, settings = seen[0][2] if seen else (None, {})
     measures = bool(seen) and (camera is None or isinstance(camera, Sensors))
     followed = _followed(entity, camera, measures)
-    found = [shape for part in parts for shape in moved(part, job.convert(part))]
+    bodies = [body for child in entities for body in moved(child, job.convert(child))]
     lights = only_one(_lights(entity), job.files.losses)
-    found = shown(found, lights, job.files.losses)
+    bodies = shown(bodies, lights, job.files.losses)
     settings = settings | followed
     around = any(isinstance(light, Environment | Sky) for light in lights)
     if measures or (around and "background" not in followed):
@@ -79,32 +79,32 @@ def _scene(entity: Entity) -> Contents:
     if seen and camera is None:
         camera = _meter(*seen[0][:2])
     elif seen and not measures:
-        check_clipping(seen[0][0], camera, found)
+        check_clipping(seen[0][0], camera, bodies)
     if isinstance(camera, Sensors):
-        camera = camera.above(Scene(found).bounds)
+        camera = camera.above(Scene(bodies).bounds)
     if seen and camera is not None and not measures:
         (camera,) = moved(seen[0][0], [camera])
-        settings = settings | _shutter(seen[0][0], [*found, *lights, camera])
+        settings = settings | _shutter(seen[0][0], [*bodies, *lights, camera])
     medium = medium_around(entity, seen[0][0] if seen else None)
-    return Contents(lights=lights, camera=camera, shapes=found, settings=settings, medium=medium)
+    return Contents(lights=lights, camera=camera, shapes=bodies, settings=settings, medium=medium)
 
 
-def _shutter(sensor: Entity, parts: list[Any]) -> dict[str, Any]:
+def _shutter(sensor: Entity, elements: list[Any]) -> dict[str, Any]:
     """Return the setting of the shutter where something moves while it is open."""
-    if not any(each.moves for each in parts):
+    if not any(element.moves for element in elements):
         return {}
     names = "shutter_open", "shutter_close"
     open_, close = (number(name, sensor.values.get(name, 0.0)) for name in names)
     return {"shutter": (open_, close)} if open_ < close else {}
 
 
-def _sensors(entity: Entity, parts: list[Entity]) -> list[tuple[Entity, Entity, Any]]:
+def _sensors(entity: Entity, entities: list[Entity]) -> list[tuple[Entity, Entity, Any]]:
     """Return the sensors of a scene and of its shapes: each with what holds it, its camera and its settings.
 
     The first one counts.
     """
-    sensors = [(sensor, part) for part in (entity, *parts) for sensor in part.held("sensor")]
-    seen = [(*each, view) for each in sensors if (view := entity.job.convert(each[0])) is not None]
+    sensors = [(sensor, holder) for holder in (entity, *entities) for sensor in holder.held("sensor")]
+    seen = [(*pair, view) for pair in sensors if (view := entity.job.convert(pair[0])) is not None]
     for sensor, *_ in seen[1:]:
         entity.lose(f"the further sensor {sensor.type!r}")
     return seen
@@ -124,14 +124,14 @@ def _followed(entity: Entity, camera: Camera | None, measures: bool) -> dict[str
 
 
 def _lights(entity: Entity) -> list[Light]:
-    lamps = [part for part in entity.held("emitter") if part.type != "area"]
-    made = [(part, light) for part in lamps if (light := entity.job.convert(part)) is not None]
-    lists = [(part, each if isinstance(each, list) else [each]) for part, each in made]
-    return [light for part, each in lists for light in moved(part, each)]
+    lamps = [lamp for lamp in entity.held("emitter") if lamp.type != "area"]
+    made = [(lamp, light) for lamp in lamps if (light := entity.job.convert(lamp)) is not None]
+    lists = [(lamp, converted if isinstance(converted, list) else [converted]) for lamp, converted in made]
+    return [light for lamp, lights in lists for light in moved(lamp, lights)]
 
 
 def _meter(sensor: Entity, place: Entity) -> SurfaceSensors | None:
-    """Return what measures the irradiance on the shape that holds a sensor."""
+    """Return the sensors of the irradiance on the shape that holds a sensor."""
     meter = meter_on(place.job.convert(place)) if place.kind == "shape" else None
     if meter is None:
         sensor.lose("left out, as it is at no mesh or sphere")

@@ -68,7 +68,7 @@ class Child(NamedTuple):
 
     parent: Element
     tag: Tag
-    given: dict[str, str]  # its attributes
+    attributes: dict[str, str]  # with the values of its parameters
     file: File
 
     @property
@@ -78,7 +78,7 @@ class Child(NamedTuple):
 
     def numbers(self, counts: tuple[int, ...]) -> list[float]:
         """Return the numbers of its value."""
-        return numbers(self.place, self.given["name"], self.given["value"], counts)
+        return numbers(self.place, self.attributes["name"], self.attributes["value"], counts)
 
 
 class Document:
@@ -140,13 +140,13 @@ class Document:
 
     def _object(self, tag: Tag, file: File) -> Element:
         """Return a plugin and all that it holds."""
-        given = self._substituted(tag)
-        element = _element(tag, type=given.get("type", "scene" if tag.name == "scene" else ""))
+        attributes = self._substituted(tag)
+        element = _element(tag, type=attributes.get("type", "scene" if tag.name == "scene" else ""))
         if not element["type"]:
             raise SceneError(f"{tag.place}: <{tag.name}> has no type")
-        self._ignore(tag, given.keys() - {"type", "id", "name", "version"})
-        if "id" in given:
-            element["id"] = given["id"]
+        self._ignore(tag, attributes.keys() - {"type", "id", "name", "version"})
+        if "id" in attributes:
+            element["id"] = attributes["id"]
         for child in tag.children:
             with self._losses.part(child.place):
                 self._add(element, child, file)
@@ -154,8 +154,8 @@ class Document:
 
     def _ignore(self, tag: Tag, unknown: set[str]) -> None:
         """Note attributes that are unknown."""
-        for each in sorted(unknown):
-            self._losses.note(f"<{tag.name}> has the unknown attribute {each!r}", tag.place, done="left out")
+        for name in sorted(unknown):
+            self._losses.note(f"<{tag.name}> has the unknown attribute {name!r}", tag.place, done="left out")
 
     def _add(self, parent: Element, tag: Tag, file: File) -> None:
         """Add what a child says to a plugin's dictionary."""
@@ -166,53 +166,53 @@ class Document:
             return
         if name not in OTHERS:
             raise SceneError(f"{tag.place}: {_unknown(name)}{self.version}")
-        given, other = self._substituted(tag), OTHERS[name]
-        for each in other.needed:
-            if each not in given:
-                raise SceneError(f"{tag.place}: <{name}> has no {each}")
-        self._ignore(tag, given.keys() - {*other.needed, *other.optional})
+        attributes, other = self._substituted(tag), OTHERS[name]
+        for needed in other.needed:
+            if needed not in attributes:
+                raise SceneError(f"{tag.place}: <{name}> has no {needed}")
+        self._ignore(tag, attributes.keys() - {*other.needed, *other.optional})
         for inner in tag.children if name not in ("transform", "animation") else ():
             self._losses.note(f"<{inner.name}> cannot be inside <{name}>", inner.place, done="left out")
-        value = other.read(self, Child(parent, tag, given, file))
+        value = other.read(self, Child(parent, tag, attributes, file))
         if other.is_value:
-            _set(parent, given.get("name", ""), value, tag, file.old)
+            _set(parent, attributes.get("name", ""), value, tag, file.old)
 
     def _reference(self, child: Child) -> Element:
-        name = child.given["id"]
+        name = child.attributes["id"]
         return _element(child.tag, type="ref", id=self._aliases.get(name, name))
 
     def _alias(self, child: Child) -> None:
-        name = child.given["id"]
-        self._aliases[child.given["as"]] = self._aliases.get(name, name)
+        name = child.attributes["id"]
+        self._aliases[child.attributes["as"]] = self._aliases.get(name, name)
 
     def _default(self, child: Child) -> None:
-        name = child.given["name"]
+        name = child.attributes["name"]
         if len(name) > MOST_LETTERS:
             raise SceneError(f"{child.place}: the name of a parameter has more than {MOST_LETTERS} letters")
-        self._values.setdefault(name, child.given["value"])
+        self._values.setdefault(name, child.attributes["value"])
 
     def _transform(self, child: Child) -> Matrix:
         """Return the matrix of the operations that are sound."""
         steps = child.tag.children
         try:
-            return product([(each.name, self._substituted(each), each.place) for each in steps])
+            return product([(step.name, self._substituted(step), step.place) for step in steps])
         except SceneError:
             matrix = np.eye(4)
-        for each in steps:
-            with self._losses.part(each.place), np.errstate(over="ignore", invalid="ignore"):
-                matrix = product([(each.name, self._substituted(each), each.place)]) @ matrix
+        for step in steps:
+            with self._losses.part(step.place), np.errstate(over="ignore", invalid="ignore"):
+                matrix = product([(step.name, self._substituted(step), step.place)]) @ matrix
         return matrix
 
     def _animation(self, child: Child) -> Keyframes | Matrix:
         """Return the motion by transforms that each have a time; what is damaged is left out."""
         keys: dict[float, Matrix] = {}
-        for each in child.tag.children:
-            with self._losses.part(each.place), placed(each.place):
-                given = self._substituted(each)
-                if each.name != "transform":
-                    raise SceneError(f"<{each.name}> cannot be inside <animation>")
-                (time,) = numbers(each.place, "time", given.get("time", ""), (1,))
-                keys[time] = self._transform(Child(child.parent, each, given, child.file))
+        for step in child.tag.children:
+            with self._losses.part(step.place), placed(step.place):
+                attributes = self._substituted(step)
+                if step.name != "transform":
+                    raise SceneError(f"<{step.name}> cannot be inside <animation>")
+                (time,) = numbers(step.place, "time", attributes.get("time", ""), (1,))
+                keys[time] = self._transform(Child(child.parent, step, attributes, child.file))
         if not keys:
             raise SceneError(f"{child.place}: <animation> has no transform with a time")
         times = sorted(keys)
@@ -224,18 +224,18 @@ class Document:
 
     def _include(self, child: Child) -> None:
         """Add the content of another file."""
-        parent, tag, given, (path, depth, _) = child
+        parent, tag, attributes, (path, depth, _) = child
         self._included += 1
         check_included(tag.place, self._files, self._included, depth)
         self.folders.append(path.parent)
         try:
             with placed(tag.place):
-                file = self.find(given["filename"])
+                file = self.find(attributes["filename"])
         finally:
             self.folders.pop()
         included = self._read(file, self._files.read(file), depth + 1)
         if included["type"] != "scene":
-            _set(parent, given.get("name", ""), included, tag)
+            _set(parent, attributes.get("name", ""), included, tag)
             return
         for key, value in included.items():
             if key not in ("type", "id"):
@@ -243,9 +243,9 @@ class Document:
 
     def _add_folder(self, child: Child) -> None:
         """Add a folder in which files are looked for; whether they may be read is checked then."""
-        name = child.given["value"]
+        name = child.attributes["value"]
         folders = (child.file.path.parent, *reversed(self.folders))
-        places = [each / name.replace("\\", "/") for each in folders]
+        places = [base / name.replace("\\", "/") for base in folders]
         folder = next((place for place in places if os.path.isdir(place)), None)
         if folder is None:
             raise SceneError(f"{child.place}: path is {name!r}; there is no such folder")
@@ -353,12 +353,12 @@ def _upgraded(element: Element) -> Element:
 
 
 def _boolean(document: Document, child: Child) -> bool:
-    text = child.given["value"].strip().lower()
-    return one_of(f"{child.place}: {child.given['name']}", text, ("true", "false")) == "true"
+    text = child.attributes["value"].strip().lower()
+    return one_of(f"{child.place}: {child.attributes['name']}", text, ("true", "false")) == "true"
 
 
 def _integer(document: Document, child: Child) -> int:
-    name, text = child.given["name"], child.given["value"]
+    name, text = child.attributes["name"], child.attributes["value"]
     try:
         return int(text)
     except ValueError:
@@ -371,14 +371,14 @@ def _rgb(document: Document, child: Child) -> Element:
 
 
 def _spectrum(document: Document, child: Child) -> Element:
-    given = {key: child.given[key] for key in ("value", "filename") if key in child.given}
-    if len(given) != 1:
+    attributes = {key: child.attributes[key] for key in ("value", "filename") if key in child.attributes}
+    if len(attributes) != 1:
         raise SceneError(f"{child.place}: <spectrum> needs a value or a filename, and not both")
-    return _element(child.tag, type="spectrum", **given)
+    return _element(child.tag, type="spectrum", **attributes)
 
 
 def _vector(document: Document, child: Child) -> list[float]:
-    return vector(child.place, child.given["name"], child.given, 0.0)
+    return vector(child.place, child.attributes["name"], child.attributes, 0.0)
 
 
 class Other(NamedTuple):
@@ -394,7 +394,7 @@ OTHERS = {
     "float": Other(lambda document, child: child.numbers((1,))[0]),
     "integer": Other(_integer),
     "boolean": Other(_boolean),
-    "string": Other(lambda document, child: child.given["value"]),
+    "string": Other(lambda document, child: child.attributes["value"]),
     "rgb": Other(_rgb),
     "point": Other(_vector, ("name",), ("value", "x", "y", "z")),
     "vector": Other(_vector, ("name",), ("value", "x", "y", "z")),

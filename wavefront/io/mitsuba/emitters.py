@@ -105,13 +105,13 @@ def _sun_and_sky(entity: Entity) -> list[Light]:
         turbidity = entity.number("turbidity", 3.0)
         return Sky.hosek_wilkie(turbidity, albedo, sun, up, scale=scale, disk=disk, ground=0.0)
 
-    found: list[Light] = [sky(of_sky, disk=False)] if of_sky else []
+    lights: list[Light] = [sky(of_sky, disk=False)] if of_sky else []
     if of_sun:
         aperture = entity.number("sun_aperture", 0.5358)
         rim = float(sin_cos(np.float64(np.radians(aperture) / 2))[1])
         power = sky(of_sun, disk=True).direct_normal * (1 + rim) / 2  # the mean cosine on the disk
-        found.append(DirectionalLight(-sun, power, angle=aperture))
-    return found
+        lights.append(DirectionalLight(-sun, power, angle=aperture))
+    return lights
 
 
 def _direction_of_sun(entity: Entity) -> Doubles:

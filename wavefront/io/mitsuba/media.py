@@ -45,8 +45,8 @@ def _homogeneous(entity: Entity) -> Medium:
 
 def phase_of(entity: Entity) -> PhaseFunction:
     """Return the phase function that a medium holds; isotropic without one."""
-    found: list[PhaseFunction] = [entity.job.convert(each) for each in entity.held("phase")]
-    return found[0] if found else Isotropic()
+    phases: list[PhaseFunction] = [entity.job.convert(child) for child in entity.held("phase")]
+    return phases[0] if phases else Isotropic()
 
 
 def coefficient(entity: Entity, name: str, default: float) -> Doubles:
@@ -75,7 +75,7 @@ plugin("hg", "phase", "g")(lambda entity: HenyeyGreenstein(entity.number("g", 0.
 @plugin("blendphase", "phase", "weight", "phase")
 def _blend(entity: Entity) -> PhaseFunction:
     first, second = [
-        entity.job.convert(each) for each in (*entity.held("phase"), *[entity.only("phase")] * 2)
+        entity.job.convert(child) for child in (*entity.held("phase"), *[entity.only("phase")] * 2)
     ][:2]
     return PhaseMix(first, second, entity.number("weight", 0.5))
 
@@ -114,31 +114,31 @@ def _grid_volume(entity: Entity) -> Volume:
 )
 def _heterogeneous(entity: Entity) -> GridMedium:
     extinction, albedo = _volume(entity, "sigma_t", 1.0), _volume(entity, "albedo", 0.75)
-    part = np.clip(albedo.values, 0, 1)
+    scattered = np.clip(albedo.values, 0, 1)
     density, color = extinction.values, np.ones(3)
     if density.size <= 3:
         density, color = np.ones((1, 1, 1)), np.broadcast_to(density.ravel(), 3)
     elif density.shape[3] == 1:
         density = density[..., 0]
     more: dict[str, Any] = {"phase": phase_of(entity), "scale": entity.number("scale", 1.0)}
-    if part.size <= 3:
-        part = np.broadcast_to(part.ravel(), 3)
-        return GridMedium(density, extinction.matrix, color * (1 - part), color * part, **more)
+    if scattered.size <= 3:
+        scattered = np.broadcast_to(scattered.ravel(), 3)
+        return GridMedium(density, extinction.matrix, color * (1 - scattered), color * scattered, **more)
     if not np.allclose(albedo.matrix, extinction.matrix):
         entity.lose("the place of albedo")
-    part = np.broadcast_to(part, (*part.shape[:3], 3))
+    scattered = np.broadcast_to(scattered, (*scattered.shape[:3], 3))
     density = density[..., None] * color if np.ptp(color) else density * color[0]
-    return GridMedium(density, extinction.matrix, albedo=part, **more)
+    return GridMedium(density, extinction.matrix, albedo=scattered, **more)
 
 
 def _volume(entity: Entity, name: str, default: float) -> Volume:
     """Return a parameter that is a volume, or a number or a color, which are a volume of one voxel."""
     value = entity.get(name, default)
     if isinstance(value, Entity) and value.type == "gridvolume":
-        found: Volume | None = entity.job.convert(value)
-        if found is None:
+        volume: Volume | None = entity.job.convert(value)
+        if volume is None:
             raise SceneError(f"{name} is no volume that can be read")
-        return found
+        return volume
     matrix = to_world(value) if isinstance(value, Entity) and value.kind == "volume" else np.eye(4)
     return Volume(coefficient(entity, name, default).reshape(1, 1, 1, 3), matrix)
 
@@ -170,14 +170,14 @@ def _made(entity: Entity) -> BaseMedium | None:
 
 
 def _content(value: Any) -> Any:
-    """Return what tells plugins with other parameters apart: neither names nor places."""
+    """Return a key of a plugin's type and parameters, without names and places."""
     if isinstance(value, Entity):
         named = value.values.items()
-        parts = [
-            (each.kind if isinstance(each, Entity) and name.startswith("_arg") else name, each)
-            for name, each in named
+        parameters = [
+            (child.kind if isinstance(child, Entity) and name.startswith("_arg") else name, child)
+            for name, child in named
         ]
-        return value.type, tuple(sorted((name, repr(_content(each))) for name, each in parts))
+        return value.type, tuple(sorted((name, repr(_content(child))) for name, child in parameters))
     value = plain(value)
     return repr(value.tolist() if isinstance(value, np.ndarray) else value)
 
@@ -190,19 +190,19 @@ def medium_around(entity: Entity, sensor: Entity | None) -> BaseMedium | None:
     if not entity.job.sees_media:
         return None
     shapes = list(_shapes(entity.held("shape")))
-    filled = [(each, medium) for each in shapes if (medium := _medium(each, "interior")) is not None]
+    filled = [(shape, medium) for shape in shapes if (medium := _medium(shape, "interior")) is not None]
     inside = [_content(medium) for _, medium in filled]
-    outside = {repr(_content(each)): each for shape in shapes if (each := _medium(shape, "exterior"))}
-    apart = [each for each in outside.values() if _content(each) not in inside]
+    outside = {repr(_content(outer)): outer for shape in shapes if (outer := _medium(shape, "exterior"))}
+    apart = [outer for outer in outside.values() if _content(outer) not in inside]
     if sensor is None:
         around, what = (apart[0] if apart else None), "another medium around all shapes"
     else:
         around, what = next(iter(sensor.held("medium")), None), "the medium outside, where the sensor is not"
-    own = None if around is None else _content(around)
-    for each in apart:
-        if _content(each) != own:
-            each.lose(what)
-    if around is None or any(_content(medium) == own and _holds(shape) for shape, medium in filled):
+    content = None if around is None else _content(around)
+    for outer in apart:
+        if _content(outer) != content:
+            outer.lose(what)
+    if around is None or any(_content(medium) == content and _holds(shape) for shape, medium in filled):
         return None
     return _made(around)
 
@@ -212,7 +212,7 @@ def _holds(shape: Entity) -> bool:
     if shape.job.eye is None or shape.type in ("shapegroup", "merge"):
         return False
     eye = shape.job.eye
-    boxes = [each.bounds for each in shape.job.convert(shape)]
+    boxes = [body.bounds for body in shape.job.convert(shape)]
     return any(bool(((eye > low) & (eye < high)).all()) for low, high in boxes)
 
 

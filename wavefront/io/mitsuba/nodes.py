@@ -47,12 +47,12 @@ class Job(Conversion):
     sees_media: bool = True  # whether the integrator does
     hides_lamps: bool = False  # whether it hides shapes that emit from the camera
 
-    def stand_in(self, part: Entity) -> tuple[Callable[[], Any], str]:
-        """Return the bsdf that a damaged bsdf holds, or what the kind of a plugin has."""
-        held = part.held("bsdf") if part.kind == "bsdf" else []
-        if held and held[0] not in self.making:
-            return lambda: self.convert(held[0]), "the bsdf in it in its place"
-        return super().stand_in(part)
+    def stand_in(self, entity: Entity) -> tuple[Callable[[], Any], str]:
+        """Return the bsdf that a damaged bsdf holds, or the replacement of the plugin's kind."""
+        bsdfs = entity.held("bsdf") if entity.kind == "bsdf" else []
+        if bsdfs and bsdfs[0] not in self.making:
+            return lambda: self.convert(bsdfs[0]), "the bsdf in it in its place"
+        return super().stand_in(entity)
 
 
 class Graph:
@@ -96,11 +96,11 @@ class Graph:
         if id(source) in self._seen:
             return
         self._seen.add(id(source))
-        own = source.get("id", key if depth == 1 else "")
-        named = isinstance(own, str) and own and f"{source.get('type')}" != "ref"
-        if named and self._ids.setdefault(own, source) is not source:
+        identity = source.get("id", key if depth == 1 else "")
+        named = isinstance(identity, str) and identity and f"{source.get('type')}" != "ref"
+        if named and self._ids.setdefault(identity, source) is not source:
             place = getattr(source, "place", "") or self._name
-            self._lost.note(f"the id {own!r} is used twice", place, done="the first one counts")
+            self._lost.note(f"the id {identity!r} is used twice", place, done="the first one counts")
         for name, value in source.items():
             if isinstance(value, Mapping):
                 self._register(value, "" if _unnamed(name) else name, depth + 1)
@@ -122,11 +122,11 @@ class Graph:
     ) -> Entity:
         """Return a plugin that is no reference, with all that it holds."""
         kind: str = source["type"]  # as it is called in messages
-        own = source.get("id", key)
-        own = own if isinstance(own, str) else ""
+        identity = source.get("id", key)
+        identity = identity if isinstance(identity, str) else ""
         label = f"{place}: {kind}" if place != path else f"{path} ({kind})"
-        label += f" {own!r}" if own and (place != path or "id" in source) else ""
-        node = Entity(TABLE.kinds[kind], kind, own, label, {}, self._job)
+        label += f" {identity!r}" if identity and (place != path or "id" in source) else ""
+        node = Entity(TABLE.kinds[kind], kind, identity, label, {}, self._job)
         for name, value in source.items():
             if name in ("type", "id"):
                 continue
@@ -146,7 +146,7 @@ class Graph:
         return node
 
     def _target(self, source: Mapping[str, Any], place: str) -> Mapping[str, Any]:
-        """Return what a reference leads to; anything else as it is."""
+        """Return the plugin that a reference leads to; any other plugin as it is."""
         for _ in range(MAX_DEPTH):
             kind = source.get("type")
             if not isinstance(kind, str) or kind != "ref":
@@ -159,45 +159,45 @@ class Graph:
         raise SceneError(f"{place}: references lead to each other")
 
     def _known(self, source: Mapping[str, Any], place: str) -> Mapping[str, Any]:
-        """Return a plugin; in place of one that is unknown, what is known of it.
+        """Return a plugin; in place of an unknown one its substitute.
 
         Raises
         ------
         SceneError
-            If that is nothing.
+            If it has none.
         """
-        kind, kept = source.get("type"), id(source)
+        kind, key = source.get("type"), id(source)
         if isinstance(kind, str) and kind in TABLE.kinds:
             return source
-        if kept not in self._kept:
+        if key not in self._kept:
             hint = did_you_mean(kind, TABLE.kinds) if isinstance(kind, str) else ""
             what = f"there is no plugin {in_brief(kind)}{self._version}{hint}"
-            self._kept[kept] = {"type": "diffuse"}, source  # where it holds itself
+            self._kept[key] = {"type": "diffuse"}, source  # where it holds itself
             made = self._substitute(source)
             made = None if made is None else self._known(made, place)
             if made is None:
-                del self._kept[kept]
+                del self._kept[key]
                 raise SceneError(f"{place}: {what}")
             self._lost.note(what, place, done=f"a {made['type']} in its place")
-            self._kept[kept] = made, source
-        return self._kept[kept][0]
+            self._kept[key] = made, source
+        return self._kept[key][0]
 
     def _substitute(self, source: Mapping[str, Any]) -> Mapping[str, Any] | None:
         """Return a plugin that keeps what it can of an unknown one."""
-        held: list[Mapping[str, Any]] = [
+        children: list[Mapping[str, Any]] = [
             self._ids.get(str(value.get("id")), value) if f"{value.get('type')}" == "ref" else value
             for value in source.values()
             if isinstance(value, Mapping)
         ]
-        known = [_kind(each) for each in held]
+        known = [_kind(child) for child in children]
         color = next((source[name] for name in COLORS if name in source), None)
         tag = getattr(source, "tag", "")
         if tag in ("", "integrator") and "integrator" in known:
-            return held[known.index("integrator")]
+            return children[known.index("integrator")]
         if tag == "integrator":
             return {"type": "path"} | {name: source[name] for name in PATHS if name in source}
         if tag in ("", "bsdf") and "bsdf" in known:
-            return held[known.index("bsdf")]
+            return children[known.index("bsdf")]
         if tag == "bsdf" or (not tag and color is not None):
             return {"type": "diffuse"} | ({} if color is None else {"reflectance": color})
         return (

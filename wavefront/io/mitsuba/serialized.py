@@ -28,19 +28,19 @@ class _Stream:
 
     def read(self, size: int) -> bytes:
         """Return the next bytes."""
-        found = b""
+        data = b""
         try:
-            while len(found) < size and not self._unpacker.eof:
-                part = self._unpacker.decompress(self._rest, size - len(found))
+            while len(data) < size and not self._unpacker.eof:
+                chunk = self._unpacker.decompress(self._rest, size - len(data))
                 self._rest = self._unpacker.unconsumed_tail
-                found += part
-                if not part and not self._rest:
+                data += chunk
+                if not chunk and not self._rest:
                     break
         except zlib.error as error:
             raise SceneError(f"{self._name}: cannot be unpacked: {error}") from error
-        if len(found) < size:
-            raise SceneError(f"{self._name}: ends {size - len(found)} bytes before the end of its mesh")
-        return found
+        if len(data) < size:
+            raise SceneError(f"{self._name}: ends {size - len(data)} bytes before the end of its mesh")
+        return data
 
     def rows(self, count: int, width: int, kind: str) -> Doubles:
         """Return an array (count, width)."""

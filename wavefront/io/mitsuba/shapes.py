@@ -188,9 +188,9 @@ def _distance_grid(entity: Entity) -> list[Shape]:
 @plugin("shapegroup merge", "shape", holds="shape")
 def _group(entity: Entity) -> list[Shape]:
     """Return its shapes, which are placed by instances."""
-    for sensor in (sensor for part in entity.held("shape") for sensor in part.held("sensor")):
+    for sensor in (sensor for child in entity.held("shape") for sensor in child.held("sensor")):
         sensor.lose("left out, as it is in a group")
-    return [shape for part in entity.held("shape") for shape in entity.job.convert(part)]
+    return [shape for child in entity.held("shape") for shape in entity.job.convert(child)]
 
 
 @plugin("instance", "shape", "to_world", holds="shape")
@@ -252,17 +252,17 @@ def angle_normals(vertices: Doubles, faces: Ints) -> Doubles:
     Vertices of one place, as on seams of texture coordinates, have normals of their own, as in Mitsuba.
     Source: G. Thürmer and C. Wüthrich 1998, "Computing Vertex Normals from Polygonal Facets".
     """
-    there = ((faces >= 0) & (faces < len(vertices))).all(1)
-    corners = faces[there].ravel()
-    flat, angles = facet_normals(vertices, faces[there]), corner_angles(vertices[faces[there]]).ravel()
+    exists = ((faces >= 0) & (faces < len(vertices))).all(1)
+    corners = faces[exists].ravel()
+    flat, angles = facet_normals(vertices, faces[exists]), corner_angles(vertices[faces[exists]]).ravel()
     sums = [np.bincount(corners, np.repeat(row, 3) * angles, len(vertices)) for row in flat]
     return np.nan_to_num(np.stack(sums, 1))  # of vertices that are not finite; their faces are left out
 
 
 def _reads(thing: Any) -> set[str]:
-    """Return the fields of surfaces that the textures of something read."""
-    found: list[BaseTexture] = textures_in(thing)
-    return {name for each in found for name in each.reads}
+    """Return the fields of surfaces that the textures of a material or an emission read."""
+    textures: list[BaseTexture] = textures_in(thing)
+    return {name for texture in textures for name in texture.reads}
 
 
 def _has_grain(material: Material) -> bool:
@@ -307,8 +307,8 @@ def _emission(entity: Entity, emitter: Entity) -> Any:
 
 def _shining(alpha: Any, emission: Any) -> tuple[Any, Any]:
     """Return the opacity and the radiance of a surface all of whose light is seen, whatever its opacity."""
-    given = alpha if isinstance(alpha, BaseTexture) else float(np.ravel(alpha)[0])
-    alpha = computed(_at_least, given, LEAST_OPACITY)
+    opacity = alpha if isinstance(alpha, BaseTexture) else float(np.ravel(alpha)[0])
+    alpha = computed(_at_least, opacity, LEAST_OPACITY)
     return alpha, computed(_quotient, emission, alpha, rising=False)
 
 
@@ -332,7 +332,7 @@ def _one(name: str, raws: list[RawMesh]) -> RawMesh:
     # what is one vertex of the file is one of the mesh, whatever the materials of its faces
     number = same_rows(raw.vertices if raw.uvs is None else np.hstack([raw.vertices, raw.uvs]))
     first = np.unique(number, return_index=True)[1]
-    columns = {each: None if (rows := getattr(raw, each)) is None else rows[first] for each in COLUMNS}
+    columns = {column: None if (rows := getattr(raw, column)) is None else rows[first] for column in COLUMNS}
     return replace(raw, faces=number[raw.faces], **columns)  # type: ignore[arg-type]
 
 
@@ -356,7 +356,7 @@ def _for_spheres(material: Material, emission: Any, job: Job) -> tuple[Material,
     both = (material, emission)
     key = (*map(id, both), "sphere")
     if key not in job.made:
-        kept = {id(each): upside_down(each) for each in textures_in(both, Texture)}
-        job.made[key] = (deepcopy(both, {**kept, **{id(kept): list(kept.values())}}), both)
-    found: tuple[Material, Any] = job.made[key][0]
-    return found
+        memo = {id(texture): upside_down(texture) for texture in textures_in(both, Texture)}
+        job.made[key] = (deepcopy(both, {**memo, **{id(memo): list(memo.values())}}), both)
+    converted: tuple[Material, Any] = job.made[key][0]
+    return converted

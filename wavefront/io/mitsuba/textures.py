@@ -66,7 +66,7 @@ def _within(entity: Entity, name: str, value: Value, use: Use) -> Value:
 
 
 def as_color(made: Any, use: Use) -> Value:
-    """Return what became of a texture, spectra as colors."""
+    """Return the value of a texture; of a spectrum, its color."""
     return made.color(use) if isinstance(made, Spectrum) else made
 
 
@@ -101,7 +101,7 @@ def roughness(entity: Entity, name: str, default: float) -> Value:
     """Return the roughness √α of a parameter α."""
     alpha = scalar(entity, name, default)
     if isinstance(alpha, BaseTexture):
-        limits = tuple(float(np.sqrt(max(each, 0))) for each in alpha.limits())
+        limits = tuple(float(np.sqrt(max(limit, 0))) for limit in alpha.limits())
         return Computed(root, alpha, limits=limits, scalar=True)
     return float(np.sqrt(alpha))
 
@@ -208,8 +208,8 @@ def picture(entity: Entity, name: str) -> Texture:
 def upside_down(texture: Texture) -> Texture:
     """Return a texture for coordinates whose v is 1 at the top row."""
     other = copy(texture)
-    given = np.eye(3) if texture.transform is None else texture.transform
-    other.transform = None if np.array_equal(given, FLIP) else given @ FLIP
+    matrix = np.eye(3) if texture.transform is None else texture.transform
+    other.transform = None if np.array_equal(matrix, FLIP) else matrix @ FLIP
     return other
 
 

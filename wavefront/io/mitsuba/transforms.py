@@ -32,15 +32,15 @@ def product(steps: list[tuple[str, Attributes, str]]) -> Matrix:
         If one is malformed. The message names its place.
     """
     matrix = np.eye(4)
-    for name, given, place in steps:
+    for name, attributes, place in steps:
         if name.lower() not in OPERATIONS:
             raise SceneError(f"{place}: <{name}> is no operation; there are {', '.join(OPERATIONS)}")
         operation, known = OPERATIONS[name.lower()]
-        unknown = given.keys() - set(known.split())
+        unknown = attributes.keys() - set(known.split())
         if unknown:
             raise SceneError(f"{place}: <{name}> has the unknown attribute {min(unknown)!r}")
         with np.errstate(over="ignore", invalid="ignore"):
-            matrix = operation(place, given) @ matrix
+            matrix = operation(place, attributes) @ matrix
     if not np.isfinite(matrix).all():
         raise SceneError(f"{steps[-1][2]}: the transform is not finite")
     return matrix
@@ -52,13 +52,13 @@ def to_world(entity: Entity) -> Matrix:
 
 
 def moved(entity: Entity, made: list[Any]) -> list[Any]:
-    """Return what a plugin has become, moving by its `to_world` where that is a motion."""
+    """Return the objects of a plugin, moving by its `to_world` if that is a motion."""
     motion = entity.values.get("to_world")
     if not isinstance(motion, Motion):
         return made
     with entity.lost.part(entity.label, "its motion left out; it stands where it begins"):
         from_start = Product(motion, np.asarray(np.linalg.inv(motion.at(motion.start)), np.float64))
-        return [each.transformed(from_start) for each in made]
+        return [element.transformed(from_start) for element in made]
     return made
 
 
@@ -81,32 +81,35 @@ def _checked(entity: Entity, name: str) -> Matrix:
     return matrix
 
 
-def vector(place: str, name: str, given: Mapping[str, str], default: float) -> list[float]:
+def vector(place: str, name: str, attributes: Mapping[str, str], default: float) -> list[float]:
     """Return (3,) given as a value, or as x, y and z."""
-    if "value" not in given:
-        return [numbers(place, f"{name} {x}", given[x], (1,))[0] if x in given else default for x in "xyz"]
-    if given.keys() & {"x", "y", "z"}:
+    if "value" not in attributes:
+        return [
+            numbers(place, f"{name} {x}", attributes[x], (1,))[0] if x in attributes else default
+            for x in "xyz"
+        ]
+    if attributes.keys() & {"x", "y", "z"}:
         raise SceneError(f"{place}: {name} has a value, and x, y or z; give one of them")
-    values = numbers(place, name, given["value"], (1, 3))
+    values = numbers(place, name, attributes["value"], (1, 3))
     return values * (3 // len(values))
 
 
-def _translate(place: str, given: Attributes) -> Matrix:
-    return translation(f"{place}: <translate>", vector(place, "<translate>", given, 0.0))
+def _translate(place: str, attributes: Attributes) -> Matrix:
+    return translation(f"{place}: <translate>", vector(place, "<translate>", attributes, 0.0))
 
 
-def _rotate(place: str, given: Attributes) -> Matrix:
-    axis = vector(place, "<rotate>", given, 0.0)
-    (angle,) = numbers(place, "angle", given.get("angle", ""), (1,))
+def _rotate(place: str, attributes: Attributes) -> Matrix:
+    axis = vector(place, "<rotate>", attributes, 0.0)
+    (angle,) = numbers(place, "angle", attributes.get("angle", ""), (1,))
     return rotation(f"{place}: <rotate>", axis, angle, (0, 0, 0))
 
 
-def _scale(place: str, given: Attributes) -> Matrix:
-    return np.diag([*vector(place, "<scale>", given, 1.0), 1.0])
+def _scale(place: str, attributes: Attributes) -> Matrix:
+    return np.diag([*vector(place, "<scale>", attributes, 1.0), 1.0])
 
 
-def _look_at(place: str, given: Attributes) -> Matrix:
-    texts = (given.get("origin", ""), given.get("target", ""), given.get("up", "0 0 0"))
+def _look_at(place: str, attributes: Attributes) -> Matrix:
+    texts = (attributes.get("origin", ""), attributes.get("target", ""), attributes.get("up", "0 0 0"))
     rows = [
         np.array(numbers(place, name, text, (3,)))
         for name, text in zip(("origin", "target", "up"), texts, strict=True)
@@ -114,8 +117,8 @@ def _look_at(place: str, given: Attributes) -> Matrix:
     return looking(f"{place}: <lookat>", *rows)
 
 
-def _matrix(place: str, given: Attributes) -> Matrix:
-    values = numbers(place, "<matrix>", given.get("value", ""), (9, 16))
+def _matrix(place: str, attributes: Attributes) -> Matrix:
+    values = numbers(place, "<matrix>", attributes.get("value", ""), (9, 16))
     size = 3 if len(values) == 9 else 4
     matrix = np.eye(4)
     matrix[:size, :size] = np.reshape(values, (size, size))

@@ -92,7 +92,7 @@ def _irradiance_meter(entity: Entity) -> tuple[None, Settings]:
 
 
 def meter_on(shapes: Sequence[Shape]) -> SurfaceSensors | None:
-    """Return what measures the irradiance on a shape that was converted; None where it has no faces."""
+    """Return the sensors of the irradiance on a converted shape; None where it has no faces."""
     (shape,) = shapes or (None,)
     ball, corners = np.zeros((1, 4)), np.zeros((0, 3, 3))
     if isinstance(shape, Sphere):

@@ -25,7 +25,7 @@ GLASSES = {"BK7": (1.5168, 64.2), "BAF10": (1.67, 47.1), "FK51A": (1.4866, 84.5)
 GLASSES |= {"F5": (1.6727, 32.2), "F10": (1.7283, 28.4), "F11": (1.7847, 25.8)}
 BRASS = ((0.444, 0.527, 1.094), (3.695, 2.765, 1.829))  # CuZn, at 650, 550 and 450 nm
 # spectra of indices as RGB
-NAMED = {f"glass-{name}": dispersed(*given) for name, given in GLASSES.items()}
+NAMED = {f"glass-{name}": dispersed(*lines) for name, lines in GLASSES.items()}
 for _name, _both in (METALS | {"CuZn": BRASS}).items():
     NAMED |= {f"metal-{_name}-eta": np.array(_both[0]), f"metal-{_name}-k": np.array(_both[1])}
 TABLE = Table("pbrt", harmless={"shape": "alpha"})  # it is read with the material
@@ -45,12 +45,12 @@ def placement(entity: Entity) -> Matrix:
     return matrix
 
 
-def values_of(given: Parameter) -> Any:
+def values_of(parameter: Parameter) -> Any:
     """Return the values of a parameter: (n,) numbers, rows (n, k) of vectors or colors, or a list."""
-    if given.type == "bool":
-        return [each == "true" for each in given.values]
-    count = NUMBERS.get(given.type, 1)
-    return given.values if count == 1 else given.values.reshape(-1, count)
+    if parameter.type == "bool":
+        return [word == "true" for word in parameter.values]
+    count = NUMBERS.get(parameter.type, 1)
+    return parameter.values if count == 1 else parameter.values.reshape(-1, count)
 
 
 def spectrum(entity: Entity, name: str, default: Any, use: str = "albedo") -> Any:
@@ -62,40 +62,40 @@ def spectrum(entity: Entity, name: str, default: Any, use: str = "albedo") -> An
 
 
 def _spectrum(entity: Entity, name: str, default: Any, use: str) -> Any:
-    found = entity.get(name, None, *SPECTRA)
-    return default if found is None else SPECTRA[entity.types[name]](entity, name, found, use)
+    values = entity.get(name, None, *SPECTRA)
+    return default if values is None else SPECTRA[entity.types[name]](entity, name, values, use)
 
 
-def _rgb(entity: Entity, name: str, found: Any, use: str) -> Any:
+def _rgb(entity: Entity, name: str, values: Any, use: str) -> Any:
     high = 1.0 if use == "albedo" else np.inf
-    color = entity.lost.within(name, np.ravel(found[:1]), 0.0, high, entity.label)
+    color = entity.lost.within(name, np.ravel(values[:1]), 0.0, high, entity.label)
     return float(color[0]) if entity.types[name] == "float" else color
 
 
-def _black_body(entity: Entity, name: str, found: Any, use: str) -> Any:
-    return _shining(blackbody(float(found[0])), use)
+def _black_body(entity: Entity, name: str, values: Any, use: str) -> Any:
+    return _shining(blackbody(float(values[0])), use)
 
 
-def _sampled(entity: Entity, name: str, found: Any, use: str) -> Any:
+def _sampled(entity: Entity, name: str, values: Any, use: str) -> Any:
     """Return the color of a name, a file, pairs of wavelength and value, or one value for all."""
-    if isinstance(found[0], str):
-        return _named(entity, name, found[0], use)
-    if len(found) == 1:
-        return np.ones(3) if use == "light" else float(found[0])
-    if len(found) % 2:
-        raise SceneError(f"{name} has {len(found)} numbers; it must be pairs of wavelength and value")
-    return _of_pairs(found.reshape(-1, 2), use)
+    if isinstance(values[0], str):
+        return _named(entity, name, values[0], use)
+    if len(values) == 1:
+        return np.ones(3) if use == "light" else float(values[0])
+    if len(values) % 2:
+        raise SceneError(f"{name} has {len(values)} numbers; it must be pairs of wavelength and value")
+    return _of_pairs(values.reshape(-1, 2), use)
 
 
-def _named(entity: Entity, name: str, found: str, use: str) -> Any:
+def _named(entity: Entity, name: str, label: str, use: str) -> Any:
     """Return the color of a spectrum that pbrt knows, or of a file."""
-    if found == WARM:
+    if label == WARM:
         return _shining(blackbody(2856.0), use)
-    if use == "light" and "illum-" in found:
-        if found not in NEUTRAL:
-            entity.lose(f"{name} {found!r}; white in its place")
+    if use == "light" and "illum-" in label:
+        if label not in NEUTRAL:
+            entity.lose(f"{name} {label!r}; white in its place")
         return np.ones(3)
-    return NAMED[found] if found in NAMED else _of_pairs(entity.job.spectrum(found), use)
+    return NAMED[label] if label in NAMED else _of_pairs(entity.job.spectrum(label), use)
 
 
 def _of_pairs(pairs: Any, use: str) -> Any:
@@ -133,7 +133,7 @@ class Job(Conversion):
     def refer(self, kind: str, name: str) -> Entity:
         """Return a named entity."""
         if (kind, name) not in self.named:
-            hint = did_you_mean(name, [each for of, each in self.named if of == kind])
+            hint = did_you_mean(name, [known for of, known in self.named if of == kind])
             raise SceneError(f"there is no {kind} {name!r}{hint}")
         return self.named[kind, name]
 

@@ -37,10 +37,10 @@ def _strength(entity: Entity, name: str) -> Doubles:
     return np.asarray(color * _factor(entity))
 
 
-def _measured(entity: Entity, name: str, own: float) -> float:
+def _measured(entity: Entity, name: str, unscaled: float) -> float:
     """Return the factor by which a light gets the power or illuminance that is asked for."""
     wanted = entity.number(name, -1.0)
-    return wanted / own if wanted > 0 and own > 0 else 1.0
+    return wanted / unscaled if wanted > 0 and unscaled > 0 else 1.0
 
 
 def _points(entity: Entity) -> tuple[Doubles, Doubles]:
@@ -72,8 +72,8 @@ def _goniometric(entity: Entity) -> PointLight | WebLight:
     table = _bilinear(_padded(factors), *sphere_to_square(at), size)[..., 0].astype(np.float64)
     web = Web(Photometry(azimuth, polar, table))
     axes = matrix[:3, [1, 0, 2]] / np.linalg.norm(matrix[:3, [1, 0, 2]], axis=0)
-    own = 4 * np.pi * float(factors.mean())
-    return WebLight(web, matrix[:3, 3], axes, strength * _measured(entity, "power", own))
+    power = 4 * np.pi * float(factors.mean())
+    return WebLight(web, matrix[:3, 3], axes, strength * _measured(entity, "power", power))
 
 
 @converts("light", "spot")
@@ -130,8 +130,8 @@ def _infinite(entity: Entity) -> Environment:
     # one lookup for each pixel, in the middle of it
     at = (np.arange(size) + 0.5) / size
     upward = np.maximum(square_to_sphere(*np.meshgrid(at, at))[2], 0)
-    own = float((luminance(pixels.transpose(2, 0, 1)) * upward).mean() * 2 * np.pi)
-    factor = _factor(entity) * _measured(entity, "illuminance", own)
+    illuminance = float((luminance(pixels.transpose(2, 0, 1)) * upward).mean() * 2 * np.pi)
+    factor = _factor(entity) * _measured(entity, "illuminance", illuminance)
     axes = placement(entity)[:3, :3]
     if not np.linalg.svd(axes, compute_uv=False)[2] > 1e-12 * np.abs(axes).max():
         raise SceneError(f"the transform of its directions is singular: {axes.tolist()}")
@@ -141,10 +141,10 @@ def _infinite(entity: Entity) -> Environment:
 
 def summed(lights: list[Light], losses: Losses) -> list[Light]:
     """Return lights with one `Environment`: those of one color are added, of images the first one counts."""
-    around = [each for each in lights if isinstance(each, Environment)]
-    even = [each for each in around if isinstance(each.record(np.zeros(3)), ConstantEnvironment)]
+    around = [light for light in lights if isinstance(light, Environment)]
+    even = [light for light in around if isinstance(light.record(np.zeros(3)), ConstantEnvironment)]
     if len(even) > 1:
-        total = Environment(np.sum([each.radiance[:, 0] for each in even], 0))
+        total = Environment(np.sum([light.radiance[:, 0] for light in even], 0))
         lights = [total, *(each for each in lights if each not in even)]
     return only_one(lights, losses)
 
@@ -190,7 +190,7 @@ def _equal_area(pixels: Floats) -> Floats:
     x, y, z = square_to_sphere(*np.meshgrid(at, at))
     row = arctan2(np.sqrt(x * x + y * y), z) / np.pi * size
     column = arctan2(y, x) / (2 * np.pi) % 1 * (2 * size)
-    row, column = (np.floor(each).astype(np.intp) for each in (row, column))
+    row, column = (np.floor(position).astype(np.intp) for position in (row, column))
     return pixels[np.minimum(row, size - 1), np.minimum(column, 2 * size - 1)]
 
 
@@ -228,16 +228,16 @@ def _by_longitude(pixels: Floats, to_light: Doubles) -> Floats:
     out = np.empty((size, 2 * size, 3), np.float32)
     turns = (np.arange(2 * size * SUBPIXELS) + 0.5) / (2 * size * SUBPIXELS) - 0.5
     across = sin_cos_turns(turns)
-    for part in spans(size, ROWS):
-        count = part.stop - part.start
+    for block in spans(size, ROWS):
+        count = block.stop - block.start
         heights = (
-            0.25 - (np.arange(count * SUBPIXELS) + 0.5) / (2 * size * SUBPIXELS) - part.start / (2 * size)
+            0.25 - (np.arange(count * SUBPIXELS) + 0.5) / (2 * size * SUBPIXELS) - block.start / (2 * size)
         )
-        up, level = (each[:, None] for each in sin_cos_turns(heights))
+        up, level = (wave[:, None] for wave in sin_cos_turns(heights))
         x, z = -across[0] * level, across[1] * level
         d = np.stack([row[0] * x + row[1] * up + row[2] * z for row in to_light])
-        found = _bilinear(padded, *sphere_to_square(d / np.sqrt(d[0] ** 2 + d[1] ** 2 + d[2] ** 2)), size)
-        out[part] = found.reshape(count, SUBPIXELS, 2 * size, SUBPIXELS, 3).mean((1, 3))
+        colors = _bilinear(padded, *sphere_to_square(d / np.sqrt(d[0] ** 2 + d[1] ** 2 + d[2] ** 2)), size)
+        out[block] = colors.reshape(count, SUBPIXELS, 2 * size, SUBPIXELS, 3).mean((1, 3))
     return out
 
 
@@ -251,8 +251,8 @@ def _padded(pixels: Floats) -> Floats:
 def _bilinear(padded: Floats, u: Doubles, v: Doubles, size: int) -> Floats:
     """Return the colors (..., 3) at points of a square, of its image with one pixel more at each edge."""
     x, y = u * size + 0.5, v * size + 0.5
-    column, row = (np.clip(np.floor(each).astype(np.intp), 0, size) for each in (x, y))
-    fx, fy = ((each - cell)[..., None].astype(np.float32) for each, cell in ((x, column), (y, row)))
+    column, row = (np.clip(np.floor(position).astype(np.intp), 0, size) for position in (x, y))
+    fx, fy = ((position - cell)[..., None].astype(np.float32) for position, cell in ((x, column), (y, row)))
     upper = padded[row, column] * (1 - fx) + padded[row, column + 1] * fx
     lower = padded[row + 1, column] * (1 - fx) + padded[row + 1, column + 1] * fx
     blended: Floats = upper * (1 - fy) + lower * fy

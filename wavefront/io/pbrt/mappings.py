@@ -38,15 +38,15 @@ class Mapping:
         What is on the axis, where a turn has no direction, gets the mean of the other corners.
         """
         assert self.coordinates is not None
-        found = self.coordinates(vertices)[faces]  # (m, 3, 2)
+        coordinates = self.coordinates(vertices)[faces]  # (m, 3, 2)
         if self.turns is not None:
-            turn = found[..., self.turns]
+            turn = coordinates[..., self.turns]
             first = np.where(np.isnan(turn[:, :1]), turn[:, 1:2], turn[:, :1])
             turn = turn - np.rint(turn - first)
             undefined = np.isnan(turn)
             middle = np.where(undefined, 0, turn).sum(1) / np.maximum((~undefined).sum(1), 1)
-            found[..., self.turns] = np.where(undefined, middle[:, None], turn)
-        return found.reshape(-1, 2)
+            coordinates[..., self.turns] = np.where(undefined, middle[:, None], turn)
+        return coordinates.reshape(-1, 2)
 
 
 class Mapped:

@@ -109,13 +109,14 @@ def _coated_diffuse(entity: Entity) -> Plastic:
 
 
 def _coat(thickness: float, ior: float) -> tuple[float, ...]:
-    """Return what a coat that absorbs lets in and out, and what it and a clear one throw back on the base."""
+    """Return the parts of light that an absorbing coat lets in and out, and that it and a clear one reflect."""
     cos = (np.arange(CELLS) + 0.5) / CELLS
     inside = fresnel_dielectric(cos.astype(f4), np.full(1, 1 / ior, f4))[0].astype(float)
     refracted = np.sqrt(np.maximum(1 - (1 - cos * cos) / ior**2, 1e-9))
-    kept, once = exp((-thickness / refracted).astype(f4)), exp((-thickness / cos).astype(f4)).astype(float)
-    parts = (kept, once * (1 - inside), once * once * inside, inside)  # weighted by the cosine
-    return tuple(float((2 * cos * each).mean()) for each in parts)
+    transmitted = exp((-thickness / refracted).astype(f4))
+    once = exp((-thickness / cos).astype(f4)).astype(float)
+    factors = (transmitted, once * (1 - inside), once * once * inside, inside)  # weighted by the cosine
+    return tuple(float((2 * cos * factor).mean()) for factor in factors)
 
 
 def _below_coat(base: Any, entry: Any, leaving: Any, back: Any, clear: Any) -> Any:
@@ -159,8 +160,8 @@ def _reflectance(eta: Any, k: Any, ior: Any = 1.0) -> Any:
 
 def _extinction(reflectance: Any) -> Any:
     """Return k of a conductor of index 1 that has this reflectance."""
-    kept = np.clip(reflectance, 0, 0.9999)
-    return 2 * np.sqrt(kept) / np.sqrt(1 - kept)
+    reflected = np.clip(reflectance, 0, 0.9999)
+    return 2 * np.sqrt(reflected) / np.sqrt(1 - reflected)
 
 
 def _metal(entity: Entity, prefix: str) -> tuple[Value, Value]:
@@ -193,16 +194,16 @@ def _diffuse_transmission(entity: Entity) -> DiffuseTransmission:
 
 @_surface("mix")
 def _mix(entity: Entity) -> Mix:
-    names, found = entity.get("materials", None, "string") or [], list[Material]()
+    names, materials = entity.get("materials", None, "string") or [], list[Material]()
     for name in names[:2]:
         with entity.lost.part(entity.label):
-            found.append(entity.job.convert(entity.job.refer("material", name)))
-    if len(found) == 1:
+            materials.append(entity.job.convert(entity.job.refer("material", name)))
+    if len(materials) == 1:
         entity.lose(f"{names} has one material that there is; it needs two")
-        found *= 2
-    if len(found) != 2:
+        materials *= 2
+    if len(materials) != 2:
         raise SceneError(f"materials names {len(names)} materials; it needs two that there are")
-    first, second = found
+    first, second = materials
     if first.bsdf.invisible or second.bsdf.invisible:
         raise SceneError("materials has an 'interface'; it cannot be mixed")
     if first.normal_map is not None or second.normal_map is not None:
@@ -251,10 +252,10 @@ def _grid(entity: Entity) -> GridMedium:
 @converts("medium", "rgbgrid")
 def _color_grid(entity: Entity) -> GridMedium:
     absorbed, scattered, light = (_voxels(entity, name, "rgb") for name in ("sigma_a", "sigma_s", "Le"))
-    given = [each for each in (absorbed, scattered) if each is not None]
-    if not given:
+    grids = [grid for grid in (absorbed, scattered) if grid is not None]
+    if not grids:
         raise SceneError("has no sigma_a and no sigma_s")
-    absorbed, scattered = (np.ones_like(given[0]) if each is None else each for each in (absorbed, scattered))
+    absorbed, scattered = (np.ones_like(grids[0]) if grid is None else grid for grid in (absorbed, scattered))
     factor = entity.number("Lescale", 1.0) * entity.job.exposure
     extinction = absorbed + scattered
     return GridMedium(
@@ -276,14 +277,14 @@ def _placed(entity: Entity) -> dict[str, Any]:
 
 def _voxels(entity: Entity, name: str, kind: str) -> Any:
     """Return the numbers (z, y, x) or colors (z, y, x, 3) of a grid; None without."""
-    size = tuple(entity.whole(each, 1, 1) for each in ("nz", "ny", "nx"))
-    given, count = entity.get(name, None, kind), np.prod(size, dtype=float)
-    if given is None:
+    size = tuple(entity.whole(axis, 1, 1) for axis in ("nz", "ny", "nx"))
+    voxels, count = entity.get(name, None, kind), np.prod(size, dtype=float)
+    if voxels is None:
         return None
-    if len(given) != count:
+    if len(voxels) != count:
         what = "numbers" if kind == "float" else "colors"
-        raise SceneError(f"{name} has {len(given)} {what}; nx, ny and nz make {count:g}")
-    return given.reshape(*size, *given.shape[1:])
+        raise SceneError(f"{name} has {len(voxels)} {what}; nx, ny and nz make {count:g}")
+    return voxels.reshape(*size, *voxels.shape[1:])
 
 
 unsupported("medium", "cloud nanovdb")
@@ -292,12 +293,12 @@ unsupported("medium", "cloud nanovdb")
 def material_of(shape: Entity, alpha: Value) -> Material:
     """Return the material of a shape, with its opacity and its medium."""
     state, job, losses = shape.state, shape.job, shape.lost
-    given, inside, outside = state.material, None, None
-    if isinstance(given, str):
-        name, given = given, None
+    material, inside, outside = state.material, None, None
+    if isinstance(material, str):
+        name, material = material, None
         with losses.part(shape.label, done="gray in its place"):
-            given = job.refer("material", name)
-    base: Material = GRAY if given is None else job.convert(given)
+            material = job.refer("material", name)
+    base: Material = GRAY if material is None else job.convert(material)
     if state.inside != state.outside:
         with losses.part(shape.label):
             inside = job.medium(state.inside)

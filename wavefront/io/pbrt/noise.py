@@ -40,8 +40,8 @@ def noise(x: Floats, y: Floats) -> Floats:
         ]
         low, high = (a + wx * (b - a) for a, b in (corners[:2], corners[2:]))
         layers.append(low + wy * (high - low))
-    found: Floats = layers[0] + MIDDLE * (layers[1] - layers[0])
-    return found
+    blended: Floats = layers[0] + MIDDLE * (layers[1] - layers[0])
+    return blended
 
 
 def _eased(t: Floats) -> Floats:
@@ -51,7 +51,7 @@ def _eased(t: Floats) -> Floats:
 
 def _slope(x: Floats, y: Floats, z: int, dx: Floats, dy: Floats, dz: Any) -> Floats:
     """Return the product of a corner's gradient and the offset from the corner."""
-    i, j = (each.astype(np.int64) & 255 for each in (x, y))
+    i, j = (index.astype(np.int64) & 255 for index in (x, y))
     which = PERMUTATION[(PERMUTATION[(PERMUTATION[i] + j) & 255] + z) & 255] & 15
     first = np.where((which < 8) | (which == 12) | (which == 13), dx, dy)
     second = np.where((which < 4) | (which == 12) | (which == 13), dy, dz)

@@ -42,13 +42,13 @@ def upgrade(entity: Entity) -> None:
     if known and kind != "light":
         return
     nearest, names = OLDER.get((kind, entity.type), (None, {}))
-    given = next((name for name in COLORS if name in entity.values), None)
+    color_name = next((name for name in COLORS if name in entity.values), None)
     if (kind, entity.type) in OLDER:
         done = f"as {nearest!r}" if nearest else "left out"
         entity.lose(f"is of pbrt-v3 or older, and this reads pbrt-v4; {done}")
-    elif kind == "material" and not known and given is not None:
+    elif kind == "material" and not known and color_name is not None:
         entity.lose("pbrt has no such material; a diffuse surface of its color in its place")
-        nearest, names = "diffuse", {given: "reflectance"}
+        nearest, names = "diffuse", {color_name: "reflectance"}
     elif kind == "camera" and not known:
         entity.lose("pbrt has no such camera; 'perspective' in its place")
         nearest = "perspective"

@@ -147,10 +147,10 @@ class _Text:
         blank = BLANK.match(self._text, self._at)
         assert blank is not None
         self._at = blank.end()
-        found = TOKEN.match(self._text, self._at)
-        if found is None and self._at < len(self._text):
+        token = TOKEN.match(self._text, self._at)
+        if token is None and self._at < len(self._text):
             raise self._error("the string has no end in its line")
-        return "" if found is None else found[0]
+        return "" if token is None else token[0]
 
     def _next(self) -> str:
         token = self._peek()
@@ -227,7 +227,7 @@ class _Text:
         return Statement(name, place, words, numbers, parameters)
 
     def _parameters(self, statement: str) -> dict[str, Parameter]:
-        found: dict[str, Parameter] = {}
+        parameters: dict[str, Parameter] = {}
         while self._peek().startswith('"'):
             place = self._place
             declared = self._string(statement).split()
@@ -239,10 +239,10 @@ class _Text:
                         f"which are {', '.join(TYPES)}, and a name"
                     )
                 kind, name = declared
-                if name in found:
+                if name in parameters:
                     raise SceneError(f"{name} is given twice")
-                found[name] = Parameter(kind, self._values(kind, name, values, plain, place), place)
-        return found
+                parameters[name] = Parameter(kind, self._values(kind, name, values, plain, place), place)
+        return parameters
 
     def _words(self, name: str, place: str) -> tuple[list[str], bool]:
         """Return the words of a value or a list, and whether they can be nothing but numbers."""
@@ -281,18 +281,18 @@ class _Text:
 def _numbers(kind: str, name: str, values: list[str], place: str) -> np.ndarray:
     """Return numbers (n,), of which several may make one value."""
     try:
-        found = np.array(values, np.float64)
+        numbers = np.array(values, np.float64)
     except ValueError:
-        found = np.full(1, np.nan)
-    if not np.isfinite(found).all():
-        bad = next((each for each in values if not np.isfinite(_number(each))), "")
+        numbers = np.full(1, np.nan)
+    if not np.isfinite(numbers).all():
+        bad = next((word for word in values if not np.isfinite(_number(word))), "")
         raise PlacedError(f"{place}: {name} has {in_brief(bad)} where a finite number must be")
     count = NUMBERS.get(kind, 1)
-    if len(found) % count:
-        raise PlacedError(f"{place}: {name} has {len(found)} numbers; a {kind} has {count}")
-    if kind == "integer" and ((found != np.floor(found)) | (np.abs(found) > 2**31)).any():
+    if len(numbers) % count:
+        raise PlacedError(f"{place}: {name} has {len(numbers)} numbers; a {kind} has {count}")
+    if kind == "integer" and ((numbers != np.floor(numbers)) | (np.abs(numbers) > 2**31)).any():
         raise PlacedError(f"{place}: {name} is {in_brief(values)}; it must be an integer of 32 bits")
-    return found
+    return numbers
 
 
 def _number(text: str) -> float:

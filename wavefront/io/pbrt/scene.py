@@ -91,7 +91,7 @@ class Reader:
             getattr(self, f"_{name}")(statement)
 
     def finish(self) -> Contents:
-        """Return what the file holds."""
+        """Return the contents of the file."""
         job = self.job
         for name, where, _ in self.stack:
             job.files.losses.note(f"{name} has no end", where, done="it ends with the file")
@@ -107,30 +107,30 @@ class Reader:
         for name in ("Sampler", "Integrator", "PixelFilter"):
             if name in self.options:
                 settings |= job.convert(self.options[name])
-        every = [*self.shapes, *(entity for each in self.objects.values() for entity in each)]
+        every = [*self.shapes, *(entity for entities in self.objects.values() for entity in entities)]
         job.insides = {entity.state.inside for entity in every}
-        found = [self._moved(entity, shape) for entity in self.shapes for shape in place(entity)]
+        shapes = [self._moved(entity, shape) for entity in self.shapes for shape in place(entity)]
         for name, uses in self.uses.items():
-            found += self._placed(name, np.array(uses))
+            shapes += self._placed(name, np.array(uses))
         lamps = [
             self._moved(entity, light) for entity in self.lights if (light := job.convert(entity)) is not None
         ]
         lamps = lights.summed(lamps, job.files.losses)
         view = None if camera is None else self._moved(camera, job.convert(camera))
-        found = shown(found, lamps, job.files.losses)
+        shapes = shown(shapes, lamps, job.files.losses)
         if self.moves and camera is not None:  # as pbrt shows it
             open_, close = camera.number("shutteropen", 0.0), camera.number("shutterclose", 1.0)
             settings |= {"shutter": (open_, close)} if open_ < close else {}
-        return Contents(lights=lamps, camera=view, shapes=found, settings=settings, medium=job.around)
+        return Contents(lights=lamps, camera=view, shapes=shapes, settings=settings, medium=job.around)
 
     def _entity(
         self, kind: str, statement: Statement, target: str, type: str, name: str = "", variant: str = ""
     ) -> Entity:
-        given = self.state.defaults.get(target, {}) | statement.parameters
-        values = {key: values_of(each) for key, each in given.items()}
+        parameters = self.state.defaults.get(target, {}) | statement.parameters
+        values = {key: values_of(parameter) for key, parameter in parameters.items()}
         entity = Entity(kind, type, name, statement.place, values, self.job, variant=variant)
-        entity.types = {key: each.type for key, each in given.items()}
-        entity.unread.difference_update(key for key, each in given.items() if each.optional)
+        entity.types = {key: parameter.type for key, parameter in parameters.items()}
+        entity.unread.difference_update(key for key, parameter in parameters.items() if parameter.optional)
         entity.matrix, entity.state = self.state.matrices[0], self.state
         retype(entity, type)
         if type:
@@ -138,7 +138,7 @@ class Reader:
         return entity
 
     def _moved(self, entity: Entity, made: Any) -> Any:
-        """Return what an entity has become; it moves between its transforms as AnimatedTransform of pbrt."""
+        """Return the object of an entity; it moves between its transforms as AnimatedTransform of pbrt."""
         ends = self.ends.get(id(entity))
         if ends is None or made is None:
             return made
@@ -156,14 +156,14 @@ class Reader:
     def _placed(self, name: str, uses: Doubles) -> list[Any]:
         """Return the shapes of an object at all its places (n, 2, 4, 4), when these begin and end."""
         still = np.array([np.array_equal(*ends) for ends in uses])
-        found: list[Any] = place_object(self.objects[name], self.job, uses[still, 0]) if still.any() else []
+        shapes: list[Any] = place_object(self.objects[name], self.job, uses[still, 0]) if still.any() else []
         for ends in uses[~still]:
             made = place_object(self.objects[name], self.job, ends[:1])
             with self.job.files.losses.part(f"ObjectInstance {name!r}", "its motion left out"):
                 made = [shape.transformed(self._between(ends)) for shape in made]
                 self.moves = True
-            found += made
-        return found
+            shapes += made
+        return shapes
 
     def _noted(self, entity: Entity) -> Entity:
         """Return an entity whose motion is noted: between which transforms it moves, if it does."""
@@ -232,9 +232,11 @@ class Reader:
         target = statement.words[0]
         if target not in TARGETS:
             raise SceneError(f"Attribute is for {target!r}; it must be one of {', '.join(TARGETS)}")
-        given = {name: replace(each, optional=True) for name, each in statement.parameters.items()}
-        own = self.state.defaults.get(target, {}) | given
-        self._set(defaults=self.state.defaults | {target: own})
+        optional = {
+            name: replace(parameter, optional=True) for name, parameter in statement.parameters.items()
+        }
+        defaults = self.state.defaults.get(target, {}) | optional
+        self._set(defaults=self.state.defaults | {target: defaults})
 
     def _ColorSpace(self, statement: Statement) -> None:
         if statement.words[0] != "srgb":
@@ -337,7 +339,7 @@ class Reader:
 
 
 def read_scene(files: SceneFiles, data: bytes, read_mesh: Callable[[Path], list[RawMesh]]) -> Contents:
-    """Return what a file holds.
+    """Return the contents of a file.
 
     Parameters
     ----------

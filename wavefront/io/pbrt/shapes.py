@@ -100,10 +100,10 @@ def _ply_mesh(entity: Entity) -> RawMesh:
     if not raws:
         raise SceneError(f"{path}: has no faces")
     faces = raws[0].faces
-    there = entity.job.once(
+    exists = entity.job.once(
         (path, "there"), lambda: existing(entity.lost, entity.label, faces, len(raws[0].vertices))
     )
-    raw = raws[0] if there.all() else replace(raws[0], faces=faces[there])
+    raw = raws[0] if exists.all() else replace(raws[0], faces=faces[exists])
     return replace(raw, name=path.name.partition(".")[0], colors=None)
 
 
@@ -145,16 +145,16 @@ def _arrays(entity: Entity, corners: int) -> RawMesh:
     if whole < len(indices):
         entity.lose(f"has {len(indices)} indices; a face has {corners}; the last ones left out")
     faces = indices[:whole].astype(np.intp).reshape(-1, corners)
-    there = existing(entity.lost, entity.label, faces, len(vertices))
-    raw = RawMesh(entity.type, vertices, faces[there])
-    given = entity.get("uv", None, *PAIRS)
-    if given is None:
-        given = entity.get("st", None, *PAIRS)
+    exists = existing(entity.lost, entity.label, faces, len(vertices))
+    raw = RawMesh(entity.type, vertices, faces[exists])
+    coordinates = entity.get("uv", None, *PAIRS)
+    if coordinates is None:
+        coordinates = entity.get("st", None, *PAIRS)
     raw.normals = _rows(entity, "N", entity.get("N", None, *NORMALS), len(vertices))
-    if given is not None:
-        given = np.ravel(given)
-        given = given[: len(given) // 2 * 2].reshape(-1, 2)
-    raw.uvs = _rows(entity, "uv", given, len(vertices))
+    if coordinates is not None:
+        coordinates = np.ravel(coordinates)
+        coordinates = coordinates[: len(coordinates) // 2 * 2].reshape(-1, 2)
+    raw.uvs = _rows(entity, "uv", coordinates, len(vertices))
     return raw
 
 
@@ -257,10 +257,10 @@ def _opacity(entity: Entity, light: Entity | None) -> Any:
 
 def _emission(light: Entity | None, area: float) -> tuple[Any, bool]:
     """Return the radiance of an area light, and whether it leaves both sides; None if there is no light."""
-    found = None if light is None else light.job.convert(light)
-    if light is None or found is None:
+    emission = None if light is None else light.job.convert(light)
+    if light is None or emission is None:
         return None, False
-    radiance, luminance, both = found
+    radiance, luminance, both = emission
     power = light.number("power", -1.0)
     if power > 0 and luminance > 0 and area > 0:
         radiance = computed(product, radiance, power / (luminance * area * np.pi * (2 if both else 1)))
@@ -274,6 +274,6 @@ def _area(raw: RawMesh) -> float:
 
 
 def _mappings(thing: Any) -> dict[Any, Mapping]:
-    """Return the mappings by the place of the textures in something."""
-    found = (each.mapping for each in textures_in(thing, Mapped))
-    return {each.key: each for each in found if each.coordinates is not None}
+    """Return the mappings by the place of the textures of a material or an emission."""
+    mappings = (texture.mapping for texture in textures_in(thing, Mapped))
+    return {mapping.key: mapping for mapping in mappings if mapping.coordinates is not None}

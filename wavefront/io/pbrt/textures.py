@@ -90,19 +90,19 @@ def _texture(entity: Entity, name: str, default: Any, kind: str) -> Value:
     return entity.or_default(default, lambda: job.convert(job.refer(kind, entity.one(name, "", "texture"))))
 
 
-def part(entity: Entity, name: str, default: float) -> Value:
+def operand(entity: Entity, name: str, default: float) -> Value:
     """Return a parameter of a texture, of its own kind."""
     if entity.variant == "float":
         return scalar(entity, name, default)
     return color(entity, name, default, "unbounded")
 
 
-converts("texture", "constant")(lambda entity: part(entity, "value", 1.0))
+converts("texture", "constant")(lambda entity: operand(entity, "value", 1.0))
 
 
 @converts("texture", "scale")
 def _scale(entity: Entity) -> Value:
-    factor, value = scalar(entity, "scale", 1.0), part(entity, "tex", 1.0)
+    factor, value = scalar(entity, "scale", 1.0), operand(entity, "tex", 1.0)
     if isinstance(value, Texture) and np.ndim(factor) == 0 and not isinstance(factor, BaseTexture):
         return _scaled(value, float(factor))
     return computed(product, value, factor)
@@ -110,22 +110,22 @@ def _scale(entity: Entity) -> Value:
 
 @converts("texture", "mix")
 def _mix(entity: Entity) -> Value:
-    one, two = (part(entity, f"tex{i}", i - 1.0) for i in (1, 2))
-    return _between(one, two, scalar(entity, "amount", 0.5))
+    first, second = (operand(entity, f"tex{i}", i - 1.0) for i in (1, 2))
+    return _between(first, second, scalar(entity, "amount", 0.5))
 
 
 @converts("texture", "checkerboard")
 def _checkerboard(entity: Entity) -> Value:
-    one, two = (part(entity, f"tex{i}", 2.0 - i) for i in (1, 2))
+    first, second = (operand(entity, f"tex{i}", 2.0 - i) for i in (1, 2))
     if entity.whole("dimension", 2, 2, 3) == 3:
         entity.lose("dimension 3; the mean in its place")
-        return _between(one, two, 0.5)
+        return _between(first, second, 0.5)
     fields = np.array([[1.0, 0.0], [0.0, 1.0]], np.float32)  # the top row is v > 1/2
     mapping = mapping_of(entity)
     transform = mapping.transform * np.array([[0.5], [0.5], [1]])  # four fields in a unit square
     texture = MappedTexture(fields, filter="nearest", transform=transform, channel=0, uv_set=mapping.uv_set)
     texture.mapping = mapping
-    return _between(one, two, texture)
+    return _between(first, second, texture)
 
 
 @converts("texture", "imagemap", harmless="maxanisotropy")
@@ -148,19 +148,19 @@ def _bilerp(entity: Entity) -> Value:
 
 @converts("texture", "dots")
 def _dots(entity: Entity) -> Value:
-    inside, outside = part(entity, "inside", 1.0), part(entity, "outside", 0.0)
+    inside, outside = operand(entity, "inside", 1.0), operand(entity, "outside", 0.0)
     inner = Computed(inside_dots, *_coordinates(entity), limits=(0.0, 1.0))
     return _between(outside, inside, inner)
 
 
 @converts("texture", "directionmix")
 def _direction_mix(entity: Entity) -> Value:
-    one, two = (part(entity, f"tex{i}", i - 1.0) for i in (1, 2))
+    first, second = (operand(entity, f"tex{i}", i - 1.0) for i in (1, 2))
     direction = placement(entity)[:3, :3] @ entity.vector("dir", (0.0, 1.0, 0.0))
     size = np.linalg.norm(direction)
     if not size > 0:
         raise SceneError("dir must not be zero")
-    return _between(two, one, Facing(direction / size))
+    return _between(second, first, Facing(direction / size))
 
 
 unsupported("texture", "fbm marble ptex windy wrinkled")
@@ -181,8 +181,8 @@ def inside_dots(s: Any, t: Any) -> Any:
     shift = f4(0.5 - DOT)
     x = s - column - shift * noise(column + f4(1.5), row + f4(2.8))
     y = t - row - shift * noise(column + f4(4.5), row + f4(9.8))
-    there = noise(column + f4(0.5), row + f4(0.5)) > 0
-    return (there & (x * x + y * y < f4(DOT * DOT))).astype(f4)
+    has_dot = noise(column + f4(0.5), row + f4(0.5)) > 0
+    return (has_dot & (x * x + y * y < f4(DOT * DOT))).astype(f4)
 
 
 def image(entity: Entity, channel: str | None) -> Texture:
@@ -234,10 +234,10 @@ def _scaled(texture: Texture, factor: float, offset: float = 0.0) -> Texture:
     return other
 
 
-def _between(one: Value, two: Value, amount: Value) -> Value:
-    value = computed(blend, one, two, amount, rising=False)
+def _between(first: Value, second: Value, amount: Value) -> Value:
+    value = computed(blend, first, second, amount, rising=False)
     if isinstance(value, Computed):
-        ends = [limits_of(each) for each in (one, two)]
+        ends = [limits_of(side) for side in (first, second)]
         if all(ends):
             value._limits = (min(end[0] for end in ends), max(end[1] for end in ends))
     return value

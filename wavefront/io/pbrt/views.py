@@ -101,13 +101,13 @@ def _perspective(entity: Entity) -> Camera:
 def _window(entity: Entity, aspect: float) -> tuple[float, ...]:
     """Return the left, right, lower and upper edge of the screen: 1 is at half the angle of view."""
     aspect = entity.number("frameaspectratio", aspect, ABOVE_0)
-    given = entity.get("screenwindow", None, "float")
-    if given is None:
+    edges = entity.get("screenwindow", None, "float")
+    if edges is None:
         wide, high = max(aspect, 1.0), max(1 / aspect, 1.0)
         return -wide, wide, -high, high
-    if len(given) != 4 or not (given[0] < given[1] and given[2] < given[3]):
-        raise SceneError(f"screenwindow is {given.tolist()}; it must be four numbers, min and max of x and y")
-    return tuple(given.tolist())
+    if len(edges) != 4 or not (edges[0] < edges[1] and edges[2] < edges[3]):
+        raise SceneError(f"screenwindow is {edges.tolist()}; it must be four numbers, min and max of x and y")
+    return tuple(edges.tolist())
 
 
 def exposure_of(film: Entity | None, camera: Entity | None) -> float:
@@ -140,7 +140,7 @@ def _film(entity: Entity) -> tuple[tuple[int, int], tuple[int, ...] | None]:
         bounds = np.concatenate([x, y])
     if bounds is None:
         return size, None
-    left, right, top, bottom = (int(each) for each in np.resize(bounds, 4))
+    left, right, top, bottom = (int(bound) for bound in np.resize(bounds, 4))
     crop = (max(left, 0), max(top, 0), min(right, size[0]), min(bottom, size[1]))
     if len(bounds) != 4 or crop[0] >= crop[2] or crop[1] >= crop[3]:
         entity.lose(f"its pixels end before they begin: {bounds.tolist()}; all of them in their place")
