@@ -109,7 +109,7 @@ def _coated_diffuse(entity: Entity) -> Plastic:
 
 
 def _coat(thickness: float, ior: float) -> tuple[float, ...]:
-    """Return the parts of light that an absorbing coat lets in and out, and that it and a clear one reflect."""
+    """Return the parts of light that an absorbing coat lets in and out, and it and a clear one reflect."""
     cos = (np.arange(CELLS) + 0.5) / CELLS
     inside = fresnel_dielectric(cos.astype(f4), np.full(1, 1 / ior, f4))[0].astype(float)
     refracted = np.sqrt(np.maximum(1 - (1 - cos * cos) / ior**2, 1e-9))
