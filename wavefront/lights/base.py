@@ -1,6 +1,6 @@
 """The contract of every light.
 
-A `Light` is what a scene holds. For a render it gives a `LightRecord`, which holds k lights of one kind,
+A `Light` is an object of a scene. For a render it gives a `LightRecord`, which holds k lights of one kind,
 a column each (`SoA`). The methods of a record work on n lanes: on a record with one column that is shared
 by all lanes, or on one that `take` gathered to a column per lane. Positions are relative to the scene's
 center. Every pdf is in solid angle.
@@ -51,7 +51,7 @@ class LightSample(SoA):
 
 @soa
 class Receiver(SoA):
-    """The surfaces that lights shine on, for lights that are sampled by what arrives there.
+    """The surfaces that lights shine on, for lights that are sampled by the irradiance there.
 
     Examples
     --------
@@ -66,7 +66,7 @@ class Receiver(SoA):
 
     normal: Floats  # (3, n) unit shading normal
     opaque: Bools  # (n,) light from behind the normal does not count
-    bins: Ints | None = None  # (n,) what images are drawn for; None where it is not found yet
+    bins: Ints | None = None  # (n,) bins of normals to draw images for; None where not known yet
     time: Doubles | None = None  # (n,) at which the light comes, s; None where no light moves
 
 
@@ -100,8 +100,8 @@ class Light(Moving, ABC):
     __slots__ = ()
     shape: Shape | None = None  # the mesh or sphere of the scene whose surface shines; None for no surface
     group: str = DEFAULT_GROUP  # for which layer of radiance the light counts
-    efficacy: float = EFFICACY  # lm/W: what `Measurement.lux` makes of its watts, see docs/luminaires.md
-    hint: ClassVar[str | None] = None  # how to turn the light to what it misses, for messages
+    efficacy: float = EFFICACY  # lm/W: by which `Measurement.lux` converts its watts, see docs/luminaires.md
+    hint: ClassVar[str | None] = None  # how to turn the light to a shape that it misses, for messages
     _points: ClassVar[tuple[str, ...]] = ()  # attributes that are positions (3,) or (n, 3)
     _directions: ClassVar[tuple[str, ...]] = ()  # attributes that are directions (3,), None where not given
 
@@ -153,8 +153,10 @@ class Light(Moving, ABC):
         """
         if not isinstance(matrix, Motion) and not self.moves:
             return self._transformed(affine(f"{type(self).__name__} transform", matrix))
-        own = matrix if isinstance(matrix, Motion) else affine(f"{type(self).__name__} transform", matrix)
-        placing = own if self.motion is None else product(own, self.motion)
+        transform = (
+            matrix if isinstance(matrix, Motion) else affine(f"{type(self).__name__} transform", matrix)
+        )
+        placing = transform if self.motion is None else product(transform, self.motion)
         assert isinstance(placing, Motion)
         rest = vars(self).get("_rest", self)
         light = self._placed_as(rest._transformed(placing.at(placing.start)))
@@ -270,8 +272,8 @@ class LightRecord(SoA, Light):
     def lighting(self, receiver: Receiver) -> LightRecord:
         """Return the light as it is sampled from n points at which it lights surfaces; here: as it is.
 
-        Its `sample_li` and `pdf_li` may draw directions by what arrives at each surface. A light that does so
-        says it by `takes_receiver`.
+        Its `sample_li` and `pdf_li` may draw directions by the irradiance of each surface. Such a light says
+        it by `takes_receiver`.
         """
         return self
 
@@ -338,7 +340,7 @@ def lit_for(light: LightRecord, receiver: Receiver | None, lanes: Lanes) -> Ligh
 
 
 def sampled_li(light: LightRecord, point: Floats, u: Floats) -> LightSample:
-    """Return what a light samples from points (3, n) with u (2, n).
+    """Return the samples of a light from points (3, n) with u (2, n).
 
     Raises
     ------
@@ -352,14 +354,14 @@ def sampled_li(light: LightRecord, point: Floats, u: Floats) -> LightSample:
         or np.shape(sample.radiance) != (3, n)
         or not np.shape(sample.pdf) == np.shape(sample.distance) == np.shape(sample.cos_light) == (n,)
     ):
-        found: dict[str, tuple[Any, tuple[int, ...]]] = {
+        fields: dict[str, tuple[Any, tuple[int, ...]]] = {
             "wi": (sample.wi, (3, n)),
             "radiance": (sample.radiance, (3, n)),
             "pdf": (sample.pdf, (n,)),
             "distance": (sample.distance, (n,)),
             "cos_light": (sample.cos_light, (n,)),
         }
-        for name, (array, due) in found.items():
+        for name, (array, due) in fields.items():
             if np.shape(array) != due:
                 raise SceneError(
                     f"{type(light).__name__}: sample_li's {name} has the shape {np.shape(array)}; "
@@ -376,16 +378,16 @@ def emitters_of(light: LightRecord) -> Emitters:
     SceneError
         If `emitters` returns something else than `Emitters` has.
     """
-    found, k = light.emitters(), len(light)
-    if found is None:
+    emitters, k = light.emitters(), len(light)
+    if emitters is None:
         nowhere = np.full((3, k), np.nan)
         return Emitters(nowhere, nowhere, nowhere[0])
     name = f"{type(light).__name__}: emitters"
-    if not isinstance(found, Emitters):
-        raise SceneError(f"{name} must return wf.Emitters or None, got {found!r}")
-    middle = finite_array(f"{name}' middle", found.middle, (3, k))
-    facing = finite_array(f"{name}' facing", found.facing, (3, k))
-    extent2 = np.asarray(found.extent2, float)
+    if not isinstance(emitters, Emitters):
+        raise SceneError(f"{name} must return wf.Emitters or None, got {emitters!r}")
+    middle = finite_array(f"{name}' middle", emitters.middle, (3, k))
+    facing = finite_array(f"{name}' facing", emitters.facing, (3, k))
+    extent2 = np.asarray(emitters.extent2, float)
     finite_array(f"{name}' extent2", np.where(extent2 == np.inf, 0, extent2), (k,))
     if (extent2 < 0).any():
         at = int(extent2.argmin())

@@ -51,7 +51,7 @@ class ConstantEnvironment(InfiniteLight):
         return np.broadcast_to(self.radiance, wi.shape)
 
     def power(self, scene_radius: float) -> Doubles:
-        """4π·L through the disk of the scene, πR², what light samples are to bring of it."""
+        """4π·L through the disk of the scene, πR²: the share of light samples."""
         return self.share * through_scene(4 * np.pi * self.radiance.mean(0, dtype=np.float64), scene_radius)
 
 
@@ -136,7 +136,7 @@ class Environment(Parametrized, FarLight):
         self._image: ImageEnvironment | None = None
         self._radiance: Floats
         self.radiance = radiance
-        self._scale = np.ones((3, 1), f4)  # what is assigned later is what it is
+        self._scale = np.ones((3, 1), f4)  # a radiance that is assigned later is not scaled
         self.group = group
 
     @property

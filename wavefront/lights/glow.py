@@ -68,14 +68,14 @@ class GlowingCells:
 class GlowLights(LightRecord):
     """A medium on a grid that glows.
 
-    A sample is a point in it. What is emitted there per unit of length, ε, is divided by a rate c, as is the
-    density q·t² of points at a distance t along directions. Their quotient, which is what counts, stays; and
+    A sample is a point in it. The emission there per unit of length, ε, is divided by a rate c, as is the
+    density q·t² of points at a distance t along directions. Their quotient stays, and it alone counts; and
     the weights of multiple importance sampling compare q·t²/c with the density of directions. Those of a
     point are the same for a path that goes through it, so they add up to 1 whatever c is. A path meets all of
-    the emission along a ray at once, so c is a few points over the extent of what glows.
+    the emission along a ray at once, so c is a few points over the extent of the medium.
     """
 
-    middle: Floats  # (3, 1) of what is emitted
+    middle: Floats  # (3, 1) of the emission
     cells: Any  # GlowingCells
 
     @classmethod
@@ -97,7 +97,7 @@ class GlowLights(LightRecord):
         return LightSample(away / distance, radiance, pdf, distance, np.ones_like(distance))
 
     def pdf_li(self, point: Floats, wi: Floats) -> Floats:
-        """Return 0: no ray meets the light as a surface. `GridMedia.sample` weighs what paths meet of it."""
+        """Return 0: no ray meets the light as a surface. `GridMedia.sample` weighs emission along paths."""
         return np.zeros(wi.shape[1], f4)
 
     def le(self, wi: Floats, surface: SurfaceInteraction | None = None) -> Floats:

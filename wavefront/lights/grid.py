@@ -38,8 +38,8 @@ class SpatialLightSampler(LightSampler):
     low, high
         (3,) corners of the scene, scene units.
     irradiance
-        Called with cell centers (3, c) and the cells' radius; returns what each light brings to
-        each cell at most, (c, k).
+        Called with cell centers (3, c) and the cells' radius; returns the most
+        irradiance of each light in each cell, (c, k).
     power
         (k,) estimated power of each light.
     """
@@ -92,8 +92,8 @@ class SpatialLightSampler(LightSampler):
         if not self.bits:
             return self.light.take(group), chance
         row = (cell << self.group_bits) + group
-        place, part, _ = _invert(self.of_light, row, self.bits, u)
-        return self.light.take((group << self.bits) + place), chance * part
+        place, light_chance, _ = _invert(self.of_light, row, self.bits, u)
+        return self.light.take((group << self.bits) + place), chance * light_chance
 
     def pmf(self, light: Ints, point: Floats) -> Floats:
         """Return the weight of each light in its point's cell."""
@@ -122,13 +122,13 @@ class _Groups:
             return np.bincount(group, values * share, groups).astype(np.float64)
 
         placed = np.isfinite(emitters.extent2)
-        everything, found = total(np.ones(len(share))), total(placed)
-        weight = np.where(found > 0, found, 1)
+        everything, placed_share = total(np.ones(len(share))), total(placed)
+        weight = np.where(placed_share > 0, placed_share, 1)
         middle, extent2 = np.where(placed, emitters.middle, 0), np.where(placed, emitters.extent2, 0)
         self.middle = np.stack([total(row) for row in middle]) / weight
         square = total((middle * middle).sum(0) + extent2) / weight
         self.extent2 = np.maximum(square - (self.middle * self.middle).sum(0), 0)
-        self.placed = found / np.where(everything > 0, everything, 1)  # part of the power
+        self.placed = placed_share / np.where(everything > 0, everything, 1)  # part of the power
 
     def cosines(self, center: Doubles, radius: float) -> Doubles:
         """Return estimates (c, ORIENTATIONS, g) of cosines at cells (3, c); 1 where nothing is known.

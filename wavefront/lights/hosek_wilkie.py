@@ -1,4 +1,4 @@
-"""The sky of Hošek and Wilkie: its data, which come with the package `mitsuba`, and what they mean."""
+"""The sky of Hošek and Wilkie: its data, which come with the package `mitsuba`, and its radiance."""
 
 from __future__ import annotations
 
@@ -59,8 +59,8 @@ def _sun(data: Doubles, turbidity: float, elevation: float) -> Doubles:
     segment = min(int(_cube_root(2 * elevation / np.pi) * SEGMENTS), SEGMENTS - 1)
     x = elevation - 0.5 * np.pi * _power(segment / SEGMENTS, 3)
     low = min(int(turbidity - 1), len(data) - 2)
-    part = turbidity - 1 - low
-    polynomials = (1 - part) * data[low, segment] + part * data[low + 1, segment]  # (3, 4, 6)
+    fraction = turbidity - 1 - low
+    polynomials = (1 - fraction) * data[low, segment] + fraction * data[low + 1, segment]  # (3, 4, 6)
     limb = np.array([2 / (j + 2) for j in range(6)])  # means of powers of the cosine over the disk
     radiance = sum(_power(x, k) * (polynomials[:, k] * limb).sum(1) for k in range(polynomials.shape[1]))
     sine = float(sin_cos(np.float64(np.radians(DIAMETER) / 2))[0])
@@ -70,8 +70,8 @@ def _sun(data: Doubles, turbidity: float, elevation: float) -> Doubles:
 def _between(table: Doubles, turbidity: float, albedo: float) -> Doubles:
     """Return the value of a table (10, 2, ...) between its entries."""
     low = min(int(turbidity), len(table) - 2)
-    part = turbidity - low
-    row = (1 - part) * table[low] + part * table[low + 1]
+    fraction = turbidity - low
+    row = (1 - fraction) * table[low] + fraction * table[low + 1]
     return np.asarray((1 - albedo) * row[0] + albedo * row[1])
 
 
@@ -91,8 +91,8 @@ def _cube_root(x: float) -> float:
 
 
 def _path() -> Path:
-    found = PathFinder.find_spec("mitsuba")  # also where it is imported, which hides its place
-    places = [] if found is None else found.submodule_search_locations or []
+    spec = PathFinder.find_spec("mitsuba")  # also where it is imported, which hides its place
+    places = [] if spec is None else spec.submodule_search_locations or []
     for folder in places:
         if (Path(folder) / FILE).is_file():
             return Path(folder) / FILE
@@ -116,7 +116,7 @@ def tensors(path: Path) -> dict[str, Doubles]:
         magic, _, count = struct.unpack_from("<12s2sI", raw)
         if magic != b"tensor_file\0":
             raise ValueError("it does not begin with tensor_file")
-        at, found = 18, {}
+        at, arrays = 18, {}
         for _ in range(count):
             (length,) = struct.unpack_from("<H", raw, at)
             name = raw[at + 2 : at + 2 + length].decode()
@@ -125,7 +125,7 @@ def tensors(path: Path) -> dict[str, Doubles]:
             shape = struct.unpack_from(f"<{dimensions}Q", raw, at + 11)
             at += 11 + 8 * dimensions
             if kind == 11:  # float64
-                found[name] = np.frombuffer(raw, "<f8", int(np.prod(shape)), start).reshape(shape)
-        return found
+                arrays[name] = np.frombuffer(raw, "<f8", int(np.prod(shape)), start).reshape(shape)
+        return arrays
     except (struct.error, ValueError, UnicodeDecodeError) as error:
         raise SceneError(f"{path} does not hold the data of the sky: {error}") from error

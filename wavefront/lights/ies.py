@@ -55,8 +55,8 @@ class Web:
         row, y, within_y = _place(self._polar, polar)
         at = column * len(self._polar) + row
         near, far = (
-            self._candela.take(each) * (f4(1) - y) + self._candela.take(each + 1) * y
-            for each in (at, at + len(self._polar))
+            self._candela.take(corner) * (f4(1) - y) + self._candela.take(corner + 1) * y
+            for corner in (at, at + len(self._polar))
         )
         return np.where(within_x & within_y, near * (f4(1) - x) + far * x, f4(0))
 

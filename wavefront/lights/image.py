@@ -48,9 +48,9 @@ class ImageEnvironment(InfiniteLight):
     poles: bool = False  # the first and the last row of the image lie at the poles
     share: float = 1.0  # of the light that light samples are to bring
     product: CosineProduct | None = None  # draws that share
-    normals: Ints | None = None  # (n,) what it is drawn for; None for no normal in particular
+    normals: Ints | None = None  # (n,) bins of normals to draw for; None for no normal in particular
     in_texels: bool = False  # light samples may take means over texels: it varies slowly
-    made: InfiniteLight | None = None  # what `compensated` has returned
+    made: InfiniteLight | None = None  # cached by `compensated`
     takes_receiver: ClassVar[bool] = True
 
     @classmethod
@@ -158,7 +158,7 @@ class ImageEnvironment(InfiniteLight):
         return self._lookup(*self._place(wi))
 
     def power(self, scene_radius: float) -> Doubles:
-        """4π times the mean radiance, through the disk of the scene, πR²; what light samples are to bring."""
+        """4π times the mean radiance, through the disk of the scene, πR²: the share of light samples."""
         return self.share * through_scene(4 * np.pi * self.mean.mean(0, dtype=np.float64), scene_radius)
 
     def _place(self, wi: Floats) -> tuple[Floats, Floats]:
@@ -222,8 +222,8 @@ def environment_pixels(source: Any) -> Floats:
     if codes.shape[2] in (2, 4):
         clear = int((pixels[..., -1] != 1).sum())
         if clear:
-            found = plural(clear, "pixel is", "pixels are")
-            warn_caller(f"{name}: {found} transparent; alpha is not used")
+            subject = plural(clear, "pixel is", "pixels are")
+            warn_caller(f"{name}: {subject} transparent; alpha is not used")
         pixels = pixels[..., :-1]
     pixels = np.array(np.broadcast_to(pixels, (*pixels.shape[:2], 3)))
     _check_finite(name, pixels)

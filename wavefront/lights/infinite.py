@@ -63,7 +63,7 @@ class EnvironmentSum(InfiniteLight):
 
     parts: tuple[InfiniteLight, ...]
     choice: Discrete
-    receiver: Receiver | None = None  # what the parts are sampled for
+    receiver: Receiver | None = None  # the surfaces for which the parts are sampled
     takes_receiver: ClassVar[bool] = True
 
     @classmethod
@@ -74,19 +74,19 @@ class EnvironmentSum(InfiniteLight):
         return cls(tuple(parts), _by_power(parts))
 
     def compensated(self) -> Self:
-        """Join what is left of the parts."""
-        parts = tuple(part.compensated() for part in self.parts)
+        """Join the compensated parts."""
+        parts = tuple(light.compensated() for light in self.parts)
         return replace(self, parts=parts, choice=_by_power(parts))
 
     def sample_li(self, point: Floats, u: Floats) -> LightSample:
-        """Choose a part with u[0], and sample it with what is left of u."""
+        """Choose a part with u[0], and sample it with the rest of u."""
         index, _, rest = self.choice.sample(u[0])
         stretched = np.stack([rest, u[1]])
         wi = np.empty((3, u.shape[1]), f4)
-        for k, part in enumerate(self.parts):
+        for k, light in enumerate(self.parts):
             lanes = np.flatnonzero(index == k)
             if lanes.size:
-                lit = lit_for(part, self.receiver, lanes)
+                lit = lit_for(light, self.receiver, lanes)
                 wi[:, lanes] = lit.sample_li(point.take(lanes, 1), stretched.take(lanes, 1)).wi
         return at_infinity(wi, self.le(wi), self.pdf_li(point, wi))
 
@@ -94,8 +94,8 @@ class EnvironmentSum(InfiniteLight):
         """Return the sum of the parts' densities, each times the chance of the part."""
         chances = self.choice.pmf(np.arange(len(self.parts)))
         pdf = np.zeros(wi.shape[1], f4)
-        for part, chance in zip(self.parts, chances, strict=True):
-            pdf += chance * lit_for(part, self.receiver, ALL).pdf_li(point, wi)
+        for light, chance in zip(self.parts, chances, strict=True):
+            pdf += chance * lit_for(light, self.receiver, ALL).pdf_li(point, wi)
         return pdf
 
     def lighting(self, receiver: Receiver) -> Self:
@@ -105,21 +105,21 @@ class EnvironmentSum(InfiniteLight):
     def le(self, wi: Floats, surface: SurfaceInteraction | None = None) -> Floats:
         """Return the sum of the parts' radiances, (3, n)."""
         radiance = np.zeros_like(wi)
-        for part in self.parts:
-            radiance += part.le(wi)
+        for light in self.parts:
+            radiance += light.le(wi)
         return radiance
 
     def power(self, scene_radius: float) -> Doubles:
         """Return the sum of the parts' powers."""
-        return np.sum([part.power(scene_radius) for part in self.parts], axis=0)
+        return np.sum([light.power(scene_radius) for light in self.parts], axis=0)
 
     def irradiance(self, center: Doubles, radius: float, scene_radius: float) -> Doubles:
-        """Return the sum of what the parts bring, (c, 1)."""
-        return np.sum([part.irradiance(center, radius, scene_radius) for part in self.parts], axis=0)
+        """Return the sum of the parts' irradiances, (c, 1)."""
+        return np.sum([light.irradiance(center, radius, scene_radius) for light in self.parts], axis=0)
 
 
 def _by_power(parts: Sequence[InfiniteLight]) -> Discrete:
-    power = np.concatenate([part.power(1.0) for part in parts])
+    power = np.concatenate([light.power(1.0) for light in parts])
     return Discrete(power if power.any() else np.ones_like(power))
 
 
@@ -135,7 +135,7 @@ def through_scene(irradiance: Doubles, scene_radius: float) -> Doubles:
 
 
 def facing_irradiance(light: LightRecord, center: Doubles) -> Doubles:
-    """Return what lights from one direction bring to surfaces that face them, (c, k), at c places."""
+    """Return the irradiance (c, k) at c places of surfaces that face lights from one direction."""
     irradiance = light.power(1.0) / np.pi
     return np.broadcast_to(irradiance, (center.shape[1], len(irradiance)))
 

@@ -57,11 +57,11 @@ class MovingLights(LightRecord):
         """Return the lights at the times of surfaces, and as they are sampled for these."""
         assert receiver.time is not None
         matrix = self._matrix(receiver.time, receiver.time.size)
-        found = replace(self, matrix=matrix)
+        lit = replace(self, matrix=matrix)
         if self.lights.takes_receiver:
             normal = normalize(turned(matrix, receiver.normal)).astype(f4)
-            found.lights = self.lights.lighting(Receiver(normal, receiver.opaque, time=receiver.time))
-        return found
+            lit.lights = self.lights.lighting(Receiver(normal, receiver.opaque, time=receiver.time))
+        return lit
 
     def sample_li(self, point: Floats, u: Floats) -> LightSample:
         """Sample the lights as they see the points (3, n)."""
@@ -102,18 +102,18 @@ class MovingLights(LightRecord):
             for time in self.motions.times(TIMES):
                 matrix = self.motions.at(np.full(cells, number), np.full(cells, time))
                 near = radius * float(_scale(matrix[:, :1])[0])
-                found = light.irradiance(applied(matrix, center), near, scene_radius)
-                most[:, some] = np.maximum(most[:, some], found)
+                irradiance = light.irradiance(applied(matrix, center), near, scene_radius)
+                most[:, some] = np.maximum(most[:, some], irradiance)
         return most
 
     def emitters(self) -> Emitters | None:
         """Return where the lights are in the middle of the time; they shine to all sides."""
-        found: Emitters | None = self.lights.emitters()
-        if found is None:
+        emitters: Emitters | None = self.lights.emitters()
+        if emitters is None:
             return None
         matrix = self.motions.at(self.number, np.full(len(self), self.motions.middle))
-        middle = moved_back(matrix, found.middle)
-        return Emitters(middle, np.zeros_like(middle), found.extent2 / _scale(matrix) ** 2)
+        middle = moved_back(matrix, emitters.middle)
+        return Emitters(middle, np.zeros_like(middle), emitters.extent2 / _scale(matrix) ** 2)
 
     def _matrix(self, time: Doubles | None, n: int) -> Doubles:
         """Return the matrices (12, n) from the scene to the lights, those that are known or at times (n,)."""
@@ -124,7 +124,7 @@ class MovingLights(LightRecord):
 
 
 def _scale(matrix: Doubles) -> Doubles:
-    """Return by what lengths are multiplied, (n,), by matrices (12, n) that keep shapes."""
+    """Return the factors (n,) of lengths of matrices (12, n) that keep shapes."""
     linear = np.concatenate([matrix[i : i + 3] for i in (0, 4, 8)])
     return np.asarray(np.sqrt((linear * linear).sum(0) / 3))
 
@@ -175,12 +175,12 @@ class DeformingLights(LightRecord):
 
     def irradiance(self, center: Doubles, radius: float, scene_radius: float) -> Doubles:
         """Return the most that the lights bring at some times while the shutter is open, (c, k)."""
-        return np.max([each.irradiance(center, radius, scene_radius) for each in self._stills()], 0)
+        return np.max([still.irradiance(center, radius, scene_radius) for still in self._stills()], 0)
 
     def emitters(self) -> Emitters:
         """Return where the lights are in the middle of the time; they shine to all sides."""
-        found: Emitters = self.lights.emitters()
-        return Emitters(found.middle, np.zeros_like(found.middle), found.extent2)
+        emitters: Emitters = self.lights.emitters()
+        return Emitters(emitters.middle, np.zeros_like(emitters.middle), emitters.extent2)
 
     def _stills(self) -> list[PlanarLights]:
         """Return the lights as they are at some times."""
@@ -193,14 +193,14 @@ class DeformingLights(LightRecord):
         """Return the lights, one for each of times (n,), where these are then."""
         when = np.full(n, (self.times[0] + self.times[-1]) / 2) if time is None else time
         lane = np.arange(n) if len(self) == n else np.zeros(n, np.intp)
-        step, part = step_at(np.array(self.times), when)
+        step, fraction = step_at(np.array(self.times), when)
         place = 9 * len(self) * step + lane
         rows = self.corners.reshape(-1)
         corners = []
         for row in range(9):
             before = rows.take(place + row * len(self)).astype(np.float64)
             after = rows.take(place + (row + 9) * len(self))
-            corners.append(before + (after - before) * part)
+            corners.append(before + (after - before) * fraction)
         a, b, c = np.stack(corners).reshape(3, 3, -1)
         u, v = b - a, c - a
         normal = cross(u, v)

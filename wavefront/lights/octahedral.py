@@ -37,12 +37,12 @@ class OctahedralEnvironment(InfiniteLight):
     means: Floats  # (3, texels) radiance
     product: TexelProduct
     share: float  # of the light that light samples are to bring
-    normals: Ints | None = None  # (n,) what it is drawn for; None for no normal in particular
+    normals: Ints | None = None  # (n,) bins of normals to draw for; None for no normal in particular
     takes_receiver: ClassVar[bool] = True
 
     @classmethod
     def of(cls, image: ImageEnvironment, least_variance: float) -> Self | None:
-        """Return what an image is to light samples; None where it varies too little to be worth any."""
+        """Return the texels of an image for light samples; None where it varies too little for them."""
         means, even = _means(image)
         weights = luminance(means.astype(np.float64)) * even
         weights /= weights.mean()
@@ -101,8 +101,8 @@ def _unfolded(x: Floats, y: Floats, wi: Floats) -> Floats:
     s -= np.copysign(below, s)
     t -= np.copysign(below, t)
     length = np.sqrt(s * s + t * t + z * z)
-    for row, part in zip(wi, (s, t, z), strict=True):
-        np.divide(part, length, out=row)
+    for row, coordinate in zip(wi, (s, t, z), strict=True):
+        np.divide(coordinate, length, out=row)
     return length
 
 
@@ -115,18 +115,18 @@ def _texels(wi: Floats) -> tuple[Ints, Floats]:
     x *= half
     y *= half
     x[below], y[below] = f4(SIDE / 2) - y.take(below), f4(SIDE / 2) - x.take(below)
-    column, row = (_places(part, sign) for part, sign in ((x, wi[0]), (y, wi[1])))
+    column, row = (_places(distance, sign) for distance, sign in ((x, wi[0]), (y, wi[1])))
     row *= SIDE
     row += column
     return row, size
 
 
-def _places(part: Floats, sign: Floats) -> Ints:
+def _places(distance: Floats, sign: Floats) -> Ints:
     """Return the rows or columns (n,) of texels at distances (n,) from the middle, to the sides of `sign`."""
-    place = np.copysign(part, sign)
+    place = np.copysign(distance, sign)
     place += f4(SIDE / 2)
-    found = place.astype(np.intp)
-    return np.minimum(found, SIDE - 1, out=found)
+    index = place.astype(np.intp)
+    return np.minimum(index, SIDE - 1, out=index)
 
 
 def _directions(samples: int) -> tuple[Doubles, Doubles]:

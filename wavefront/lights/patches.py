@@ -1,4 +1,4 @@
-"""An environment of radiance 1 whose patches are groups of lights: what each part of the sky brings."""
+"""An environment of radiance 1 whose patches are groups of lights: the share of each part of the sky."""
 
 from __future__ import annotations
 
@@ -65,7 +65,7 @@ class SkyPatches:
     def directions(self, along: int) -> Doubles:
         """Return along² evenly spread directions for each patch of the sky, (3, patches − 1, along²)."""
         cell = (np.arange(along) + 0.5) / along
-        u, v = (each.ravel() for each in np.meshgrid(cell, cell))
+        u, v = (grid.ravel() for grid in np.meshgrid(cell, cell))
         row = np.repeat(np.arange(len(self.per_row)), self.per_row)[:, None]
         count = self.per_row[row]
         place = np.arange(1, len(self))[:, None] - self.first[row]
@@ -73,7 +73,7 @@ class SkyPatches:
         east, north = sin_cos_turns((place + u - 0.5) / count)
         level = np.sqrt((1 - up) * (1 + up))
         local = (north * level, east * level, up)
-        return sum(axis[:, None, None] * each for axis, each in zip(self.axes.T, local, strict=True))
+        return sum(axis[:, None, None] * part for axis, part in zip(self.axes.T, local, strict=True))
 
     def weights(self, along: int) -> Doubles:
         """Return a horizontal plane's weights (patches − 1, along²) for means over `directions(along)`."""

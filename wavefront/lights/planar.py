@@ -49,8 +49,8 @@ class PlanarLights(LightRecord):
         normal = np.cross(edge_u, edge_v, axis=0)
         size = np.linalg.norm(normal, axis=0)
         p, u, v, n = (np.ascontiguousarray(rows, f4) for rows in (corner, edge_u, edge_v, normal / size))
-        each = np.broadcast_to(radiance, p.shape).astype(f4)
-        return cls(p, u, v, n, (cls.parallelograms * size).astype(f4), each)
+        radiances = np.broadcast_to(radiance, p.shape).astype(f4)
+        return cls(p, u, v, n, (cls.parallelograms * size).astype(f4), radiances)
 
     def le(self, wi: Floats, surface: SurfaceInteraction | None = None) -> Floats:
         """Return the radiance of rays that meet an emitting side, (3, n), else 0."""
@@ -77,7 +77,7 @@ class PlanarLights(LightRecord):
         return Emitters(self._middle().astype(np.float64), facing, self.area.astype(np.float64))
 
     def lighting(self, receiver: Receiver) -> Self:
-        """Return the lights as they are sampled for surfaces, by what arrives from their sides."""
+        """Return the lights as they are sampled for surfaces, by the irradiance from their sides."""
         return replace(self, receiver=receiver) if self.few else self
 
     def _across(self) -> tuple[Floats, Floats]:
@@ -88,12 +88,12 @@ class PlanarLights(LightRecord):
         """Return slopes (2, n) for `warp.linear`, given the way (3, n) to the middle of the square of u.
 
         They are None where no surface is known. At the middles of opposite sides, densities have the ratio of
-        what arrives from there, per area or `near` per solid angle: of cosθ/d³ or of cosθ. If heights above
+        the irradiance from there, per area or `near` per solid angle: of cosθ/d³ or of cosθ. If heights above
         the surface are c ± k and squared distances q ± g, these have the ratios (1 + a)/(1 − a), a = k/c, and
         (1 + b)/(1 − b), b = g/q. Products of such ratios add a and b as hyperbolic tangents add.
 
         Source: M. Pharr, W. Jakob and G. Humphreys, Physically Based Rendering, 4th edition, 2023, section
-        6.5.3, for a warp by what arrives.
+        6.5.3, for a warp by the irradiance.
         """
         if self.receiver is None:
             return None

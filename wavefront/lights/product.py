@@ -12,7 +12,7 @@ from ..sampling.discrete import Inversion, within_cell
 from .base import Receiver
 
 NORMALS = 16  # squared: the normals of the table, on an octahedron
-NO_NORMAL = NORMALS * NORMALS  # number of what has none
+NO_NORMAL = NORMALS * NORMALS  # number of points without a normal
 CELLS = 16, 32  # rows and columns at most, of parts of the image that a normal weighs as wholes
 MARGIN = 0.08  # added to cosines: a cell, and the normals of a bin, reach beyond their middles
 EDGE = f4(2.0**-12)  # of a texel: how far from its edge samples stay, more than their rounding
@@ -74,11 +74,11 @@ class CosineProduct:
                 (middle[1], None, cos_theta),
                 (middle[2], cos_phi, sin_theta),
             ):
-                part = band if level is None else band * level[start:stop, None]
-                part = part.sum(0, dtype=np.float64)
+                sums = band if level is None else band * level[start:stop, None]
+                sums = sums.sum(0, dtype=np.float64)
                 if factor is not None:
-                    part *= factor
-                out[row] = np.add.reduceat(part, self._column_edges[:-1])
+                    sums *= factor
+                out[row] = np.add.reduceat(sums, self._column_edges[:-1])
         return mass, np.divide(middle, mass, out=np.zeros_like(middle), where=mass > 0)
 
     def _light_along(self, light: Floats, directions: Doubles) -> tuple[Doubles, Doubles]:
@@ -199,7 +199,7 @@ class TexelProduct(CosineProduct):
 
     @cached_property
     def _cell_of(self) -> Ints:
-        """The cells of texels, (H·W,); not a part of what is compared, as it is made where it is used."""
+        """The cells of texels, (H·W,); made where they are used, so not compared."""
         of = self._cell_row[:, None] * self._cells[1] + self._cell_column
         return of.ravel().astype(np.int32)  # half the memory
 
@@ -213,7 +213,7 @@ class TexelProduct(CosineProduct):
 def octahedral_normals() -> Doubles:
     """Return unit vectors (3, NORMALS²) at the middles of bins on an octahedron."""
     middle = (np.arange(NORMALS) + 0.5) / NORMALS * 2 - 1
-    x, y = (each.ravel() for each in np.meshgrid(middle, middle, indexing="ij"))
+    x, y = (grid.ravel() for grid in np.meshgrid(middle, middle, indexing="ij"))
     z = 1 - np.abs(x) - np.abs(y)
     fold = np.maximum(-z, 0)
     normal = np.stack([x - np.where(x >= 0, fold, -fold), y - np.where(y >= 0, fold, -fold), z])

@@ -37,7 +37,7 @@ class Projector(AimedLight):
     position
         (3,) scene units.
     picture
-        A `Texture` of colors, or what makes one: a file or an array. Its size gives the ratio of its sides.
+        A `Texture` of colors, or a file or an array of one. Its size gives the ratio of its sides.
     intensity
         W/sr of white on the axis, one number or three. A screen that faces the projector at distance d has
         the irradiance I·color/d² everywhere.

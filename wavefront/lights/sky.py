@@ -69,7 +69,7 @@ class SkyLight(InfiniteLight):
         return np.where(height >= 0, above, self.ground)
 
     def power(self, scene_radius: float) -> Doubles:
-        """4π times the mean radiance, through the disk of the scene; what light samples are to bring."""
+        """4π times the mean radiance, through the disk of the scene: the share of light samples."""
         return self.table.power(scene_radius)
 
 
@@ -175,16 +175,17 @@ class Sky(Parametrized, FarLight):
     @property
     def efficacy(self) -> float:
         """lm/W of the watts of sky and sun."""
-        given = [self.direct_normal] if self.scale is not None else [self.horizontal, self.direct_normal]
+        inputs = [self.direct_normal] if self.scale is not None else [self.horizontal, self.direct_normal]
         usual = DAYLIGHT if self._efficacy is None else self._efficacy
-        found = {getattr(each, "efficacy", usual) for each in given if each.any()} or {usual}
-        found |= set() if self._efficacy is None else {self._efficacy}
-        if len(found) > 1:
+        efficacies = {getattr(light, "efficacy", usual) for light in inputs if light.any()} or {usual}
+        efficacies |= set() if self._efficacy is None else {self._efficacy}
+        if len(efficacies) > 1:
             raise SceneError(
-                f"Sky horizontal, direct_normal and efficacy have {' and '.join(map(str, sorted(found)))} "
-                "lm/W; give all of its light in watts, or all by from_photometric"
+                "Sky horizontal, direct_normal and efficacy have "
+                f"{' and '.join(map(str, sorted(efficacies)))} lm/W; "
+                "give all of its light in watts, or all by from_photometric"
             )
-        return float(found.pop())
+        return float(efficacies.pop())
 
     @efficacy.setter
     def efficacy(self, value: float | None) -> None:
@@ -396,11 +397,11 @@ class Sky(Parametrized, FarLight):
 
     def radiance(self, directions: ArrayLike) -> Doubles:
         """Return the radiance without the sun's disk, (n, 3), in directions (n, 3) of any length."""
-        given = finite_array("directions", directions, (None, 3))
-        length = np.sqrt((given * given).sum(1, keepdims=True))
+        vectors = finite_array("directions", directions, (None, 3))
+        length = np.sqrt((vectors * vectors).sum(1, keepdims=True))
         if not length.all():
             raise SceneError("directions must not be zero")
-        return self._light.le(np.ascontiguousarray((given / length).T, f4)).T.astype(float)
+        return self._light.le(np.ascontiguousarray((vectors / length).T, f4)).T.astype(float)
 
     def record(self, center: Doubles) -> InfiniteLight:
         """Return the sky, and the sun in it, as a record of one column."""
@@ -430,7 +431,7 @@ def _table(function: SkyFunction, rotation: Doubles, sun: Doubles) -> Floats:
     rows = ROWS // 2
     level, high = sin_cos_turns((np.arange(rows) + 0.5) / (2 * ROWS))
     across, along = sin_cos_turns(0.5 - (np.arange(COLUMNS) + 0.5) / COLUMNS)
-    x, z = (level[:, None] * part for part in (across, along))
+    x, z = (level[:, None] * component for component in (across, along))
     local = np.stack([x, np.broadcast_to(high[:, None], x.shape), z]).reshape(3, -1)
     wi = turned(rotation, local).astype(f4)
     relative = relative_radiance(function, wi, local[1].astype(f4), sun.astype(f4))

@@ -86,7 +86,7 @@ class SpotLights(DeltaLight):
         if not self.linear.any():
             return _eased(ramp, self.step)
         end, angle = (
-            f4(2) * arcsin(np.sqrt(np.minimum(each * f4(0.5), f4(1)))) for each in (self.outer, away)
+            f4(2) * arcsin(np.sqrt(np.minimum(versine * f4(0.5), f4(1)))) for versine in (self.outer, away)
         )
         linear = np.clip((end - angle) * self.linear, f4(0), f4(1))
         return np.where(self.linear > 0, linear, _eased(ramp, self.step))
@@ -224,8 +224,8 @@ class SpotLight(AimedLight):
         "smooth" is that of glTF, "linear" is linear in the angle, as in Mitsuba, and "smoothstep" is that of
         pbrt.
     picture, up
-        A `Texture`, or what makes one: its colors multiply the intensity, in a square around the cone. `up`
-        is the direction (3,) of its upper edge.
+        A `Texture`, or a file or an array: its colors multiply the intensity, in a square around the cone.
+        `up` is the direction (3,) of its upper edge.
     group
         Name of the light group, for `aovs="light_groups"`.
 

@@ -86,7 +86,7 @@ class LightTable:
         if not power.any():
             return None
         if not power.all():
-            shining = [np.flatnonzero(part) for part in np.split(power, self.starts[1:-1])]
+            shining = [np.flatnonzero(kind_power) for kind_power in np.split(power, self.starts[1:-1])]
             kinds = [kind.take(lanes) for kind, lanes in zip(self.kinds, shining, strict=True) if lanes.size]
             chosen = LightTable(kinds, half_size, make).choice
             return None if chosen is None else SubsetLightSampler(chosen, np.flatnonzero(power), power.size)
@@ -99,7 +99,7 @@ class LightTable:
     ) -> tuple[LightSample, Ints]:
         """Choose a light for each point (3, n) with u_choice (n,) and sample it with u (2, n).
 
-        `receiver` is what the light shines on; None where that is not known.
+        `receiver` has the surfaces that the light shines on; None where they are not known.
 
         Returns
         -------
@@ -182,10 +182,10 @@ class LightTable:
         lanes, others = np.flatnonzero(far), np.flatnonzero(~far)
         radiance = np.empty_like(wi)
         put(radiance, lanes, self.texels.le_of_texels(take(wi, lanes), pdf.take(lanes)))
-        found = self.le(
+        radiance_others = self.le(
             light.take(others), take(wi, others), surface_at and (lambda some: surface_at(others.take(some)))
         )
-        put(radiance, others, found)
+        put(radiance, others, radiance_others)
         return radiance
 
     def _le(self, light: Ints, wi: Floats, surface: SurfaceInteraction | None) -> Floats:
@@ -207,13 +207,14 @@ class LightTable:
         for kind, rows in self._by_kind(light):
             if isinstance(rows, slice):
                 return sampled_li(lit_for(kind, receiver, rows), point, u)
-            part = sampled_li(lit_for(kind, receiver, rows), take(point, rows), take(u, rows))
-            put(out.wi, rows, part.wi)
-            put(out.radiance, rows, part.radiance)
-            out.pdf[rows], out.distance[rows], out.cos_light[rows] = part.pdf, part.distance, part.cos_light
-            if part.prim is not None:
+            sample = sampled_li(lit_for(kind, receiver, rows), take(point, rows), take(u, rows))
+            put(out.wi, rows, sample.wi)
+            put(out.radiance, rows, sample.radiance)
+            out.pdf[rows], out.distance[rows] = sample.pdf, sample.distance
+            out.cos_light[rows] = sample.cos_light
+            if sample.prim is not None:
                 where = where or (np.full(n, -1, np.intp), np.zeros(n, f4), np.zeros(n, f4))
-                where[0][rows], where[1][rows], where[2][rows] = part.prim, part.b1, part.b2
+                where[0][rows], where[1][rows], where[2][rows] = sample.prim, sample.b1, sample.b2
         if where is not None:
             out.prim, out.b1, out.b2 = where
         return out

@@ -137,8 +137,8 @@ def mean_radiance(mesh: Mesh, triangles: Doubles) -> Floats:
         value = emission_at(emission, surface)
         if opacity is not None:
             value = value * opacity.at(surface)
-        each = np.broadcast_to(value, (3, len(surface))).reshape(3, -1, len(b1))
-        mean[:, faces] = each.mean(2, dtype=np.float64)
+        samples = np.broadcast_to(value, (3, len(surface))).reshape(3, -1, len(b1))
+        mean[:, faces] = samples.mean(2, dtype=np.float64)
     return mean
 
 

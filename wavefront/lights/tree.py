@@ -83,20 +83,20 @@ class LightTreeSampler(LightSampler):
         """Choose a child at each level by inverting its cumulative weights."""
         n = len(u)
         light, chance = np.empty(n, np.intp), np.empty(n, f4)
-        for part in spans(n, AT_ONCE):
-            light[part], chance[part] = self._sample(point[:, part], u[part], self._receiver(part))
+        for span in spans(n, AT_ONCE):
+            light[span], chance[span] = self._sample(point[:, span], u[span], self._receiver(span))
         return self.light.take(light), chance
 
     def pmf(self, light: Ints, point: Floats) -> Floats:
         """Return the product of the chances of all children on the way to each light."""
         n = len(light)
         slot, chance = self.slot.take(light), np.empty(n, f4)
-        for part in spans(n, AT_ONCE):
-            chance[part] = self._pmf(slot[part], point[:, part], self._receiver(part))
+        for span in spans(n, AT_ONCE):
+            chance[span] = self._pmf(slot[span], point[:, span], self._receiver(span))
         return chance
 
-    def _receiver(self, part: slice) -> Receiver | None:
-        return None if self.receiver is None else self.receiver.take(part)
+    def _receiver(self, span: slice) -> Receiver | None:
+        return None if self.receiver is None else self.receiver.take(span)
 
     def _sample(self, point: Floats, u: Floats, receiver: Receiver | None) -> tuple[Ints, Floats]:
         n = len(u)
@@ -204,10 +204,10 @@ def compact_order(middle: Doubles, slot: Ints, depth: int) -> Ints:
         size = np.diff(begin, append=count)
         low = np.minimum.reduceat(rows, begin, 1)
         extent = np.maximum.reduceat(rows, begin, 1) - low
-        axis, each = extent.argmax(0), np.arange(begin.size)
+        axis, segments = extent.argmax(0), np.arange(begin.size)
         along = rows.reshape(-1).take(np.repeat(axis * count, size) + np.arange(count))
-        along -= np.repeat(low[axis, each], size)
-        along *= np.repeat(f4(steps) / np.maximum(extent[axis, each], f4(1e-30)), size)
+        along -= np.repeat(low[axis, segments], size)
+        along *= np.repeat(f4(steps) / np.maximum(extent[axis, segments], f4(1e-30)), size)
         word = (segment * (steps + 1) + along.astype(np.intp)).astype(np.uint64) << shift
         word |= number
         word.sort()

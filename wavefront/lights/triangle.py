@@ -27,12 +27,12 @@ class TriangleLights(PlanarLights):
     def from_triangles(cls, triangles: Doubles, radiance: Floats) -> Self:
         """Build from vertices (k, 3, 3), relative to the scene's center, and radiance (3, k) or (3, 1)."""
         a, b, c = triangles.transpose(1, 2, 0)
-        found = cls.from_edges(a, b - a, c - a, radiance)
-        found.few = len(triangles) <= FEW
-        return found
+        lights = cls.from_edges(a, b - a, c - a, radiance)
+        lights.few = len(triangles) <= FEW
+        return lights
 
     def sample_li(self, point: Floats, u: Floats) -> LightSample:
-        """Pick a point uniformly by area, with the density d²/(A·cosθ), or for a surface by what arrives."""
+        """Pick a point uniformly by area, density d²/(A·cosθ), or for a surface by its irradiance."""
         return self._sample_at(point, u)[0]
 
     def _sample_at(self, point: Floats, u: Floats) -> tuple[LightSample, Floats]:
