@@ -58,7 +58,7 @@ def cosine_mean(table: Floats) -> Floats:
 
 
 def tabulate(row: Callable[[Floats, Floats, Floats], tuple[Floats, ...]]) -> tuple[Floats, ...]:
-    """Average what `row` gives for wo (3, m), roughness (1,) and u (2, m) over u: tables (SIZE, SIZE)."""
+    """Average the results of `row` for wo (3, m), roughness (1,) and u (2, m) over u: tables (SIZE, SIZE)."""
     mu = np.maximum(np.linspace(0, 1, SIZE) ** 2, 1e-4)
     wo = np.stack([np.sqrt(1 - mu * mu), 0 * mu, mu]).astype(f4).repeat(SIDE * SIDE, 1)
     u = (np.indices((SIDE, SIDE)).reshape(2, -1) + 0.5) / SIDE
@@ -97,7 +97,7 @@ def _dielectric_tables() -> tuple[Floats, Floats]:
 
 
 def _reflected(wo: Floats, roughness: Floats, u: Floats) -> tuple[Floats, Floats]:
-    """Return microfacets (3, m) that wo sees, and G2/G1 of what they reflect, (m,)."""
+    """Return microfacets (3, m) that wo sees, and G2/G1 of their reflections, (m,)."""
     facets = Facets(alpha_of(roughness))
     m = facets.visible_normals(wo, u)
     wi = reflect(wo, m)

@@ -71,7 +71,7 @@ class Bsdf(Parametrized, ABC):
     invisible: bool = False  # light passes as if there were no surface
     catches_shadows: bool = False  # the camera sees only shadows on it
     dimensions: int = 2  # rows of u that sample_f reads
-    indices: ClassVar[tuple[str, ...]] = ()  # parameters that are indices of refraction of what it encloses
+    indices: ClassVar[tuple[str, ...]] = ()  # parameters that are indices of refraction inside
     specular: bool = False  # every lobe is a delta: f and pdf are 0, light sampling is skipped
     back_facing: Bools | None = None  # (n,) wo is on the back, for some that are bound; unbound, on the front
 
@@ -115,7 +115,7 @@ class Bsdf(Parametrized, ABC):
 
     @property
     def index_inside(self) -> Any:
-        """Index of refraction of what the surface encloses, an array or a texture; None if it has none."""
+        """Index of refraction inside the surface, an array or a texture; None if it has none."""
         return getattr(self, "ior", None)
 
     @property
@@ -131,18 +131,18 @@ class Bsdf(Parametrized, ABC):
     def bind(self, surface: SurfaceInteraction) -> Self:
         """Return this BSDF with its spatial parameters looked up at `surface` (n columns).
 
-        Its `indices` are then relative to the index of refraction of what is around.
+        Its `indices` are then relative to the index of refraction around the surface.
         """
-        found = {
+        parameters = {
             name: value.at(surface) for name, value in vars(self).items() if isinstance(value, BaseTexture)
         }
         if surface.index_around is not None and self.encloses:
             for name in self.indices:
-                found[name] = found.get(name, getattr(self, name)) / surface.index_around
-        if not found:
+                parameters[name] = parameters.get(name, getattr(self, name)) / surface.index_around
+        if not parameters:
             return self
         bound = copy(self)
-        vars(bound).update(found)  # not by assignment, which would check them
+        vars(bound).update(parameters)  # not by assignment, which would check them
         return bound
 
     def albedo(self, wo: Floats) -> Floats:
@@ -215,7 +215,7 @@ def evaluated(bsdf: Bsdf, wo: Floats, wi: Floats) -> tuple[Floats, Floats]:
 
 
 def sampled(bsdf: Bsdf, wo: Floats, u: Floats) -> BsdfSample:
-    """Return what a BSDF samples for wo (3, n) with u (dimensions, n).
+    """Return the samples of a BSDF for wo (3, n) with u (dimensions, n).
 
     Raises
     ------
@@ -225,13 +225,13 @@ def sampled(bsdf: Bsdf, wo: Floats, u: Floats) -> BsdfSample:
     out = bsdf.sample_f(wo, u[: bsdf.dimensions])
     n = wo.shape[1]
     if np.shape(out.wi) != (3, n) or np.shape(out.weight) != (3, n) or np.shape(out.pdf) != (n,):
-        found = {"wi": (out.wi, 3), "weight": (out.weight, 3), "pdf": (out.pdf, None)}
-        _check_shapes(bsdf, n, {f"sample_f's {name}": value for name, value in found.items()})
+        arrays = {"wi": (out.wi, 3), "weight": (out.weight, 3), "pdf": (out.pdf, None)}
+        _check_shapes(bsdf, n, {f"sample_f's {name}": value for name, value in arrays.items()})
     return out
 
 
 def albedo_of(bsdf: Bsdf, wo: Floats) -> Floats:
-    """Return the albedo of a BSDF (3, n), limited to [0, 1]; what is not finite is NaN.
+    """Return the albedo of a BSDF (3, n), limited to [0, 1]; NaN where it is not finite.
 
     Raises
     ------
@@ -247,8 +247,8 @@ def albedo_of(bsdf: Bsdf, wo: Floats) -> Floats:
     return np.broadcast_to(limited, (3, n))
 
 
-def _check_shapes(bsdf: Bsdf, n: int, found: dict[str, tuple[Any, int | None]]) -> None:
-    for name, (array, rows) in found.items():
+def _check_shapes(bsdf: Bsdf, n: int, arrays: dict[str, tuple[Any, int | None]]) -> None:
+    for name, (array, rows) in arrays.items():
         wanted = (n,) if rows is None else (rows, n)
         if np.shape(array) != wanted:
             due = "(n,)" if rows is None else f"({rows}, n)"

@@ -45,11 +45,11 @@ def sample_channels(glass: Dielectric, wo: Floats, u: Floats) -> BsdfSample:
     cos = wo[2] if smooth else np.maximum(dot(wo, m), f4(0))
     reflected, cos_refracted, eta = fresnel_channels(glass, cos)
     chance = _shares(glass, wo)
-    part = chance * (f4(1) - reflected)
+    refracted = chance * (f4(1) - reflected)
     mean = _total(chance * reflected)
     reflects = u[2] < mean
     left = u[2] - mean
-    k = (left >= part[0]).astype(np.intp) + (left >= part[0] + part[1])
+    k = (left >= refracted[0]).astype(np.intp) + (left >= refracted[0] + refracted[1])
     index = _of(eta, k)
     wi = np.where(reflects, reflect(wo, m), refract(wo, m, cos, _of(cos_refracted, k), index))
     relative = np.where(reflects, f4(1), index)
@@ -58,7 +58,7 @@ def sample_channels(glass: Dielectric, wo: Floats, u: Floats) -> BsdfSample:
         pdf = np.where((wi[2] > 0) == reflects, pdf, f4(0))
         return BsdfSample(wi, weigh(f, wi, pdf), pdf, broadcast(np.False_, n), relative)
     followed = np.arange(3)[:, None] == k if glass.dispersive else np.ones((3, n), np.bool_)
-    passed = _of(part, k) if glass.dispersive else _total(part)
+    passed = _of(refracted, k) if glass.dispersive else _total(refracted)
     pdf = np.where(reflects, mean, passed)
     inverse = f4(1) / (np.where(pdf > 0, pdf, f4(1)) * relative * relative)
     crosses = glass.transmittance * ((f4(1) - reflected) * followed)

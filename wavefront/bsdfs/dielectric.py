@@ -54,9 +54,9 @@ class Dielectric(RefractiveBsdf):
     roughness_v, rotation, distribution, shadowing
         As for `Conductor`.
     film_thickness, film_ior
-        As for `Conductor`: a film on the outside; both indices are relative to what surrounds the shape.
+        As for `Conductor`: a film on the outside; both indices are relative to the medium around the shape.
     multiscatter
-        Return what microfacets scatter more than once, except with dispersion, an index by texture, or in
+        Add multiple scattering by the microfacets, except with dispersion, an index by texture, or in
         scenes with a `priority`. Without it, for index 1.5, seen along the normal, 0.1 % from outside
         and 1 % from inside are lost at roughness 0.32, 1 % and 7 % at 0.5, 3 % and 25 % at 0.71, 11 % and
         58 % at 1. A whole sphere in uniform light loses 0.06 % at 0.1, 4 % at 0.32, 18 % at 0.5, 41 % at
@@ -165,7 +165,7 @@ class Dielectric(RefractiveBsdf):
         return self._tint(wi) * f, pdf
 
     def _tint(self, wi: Floats) -> Floats:
-        """Return the tint of what leaves along wi (3, n), (3, n) or (3, 1)."""
+        """Return the tint of light that leaves along wi (3, n), (3, n) or (3, 1)."""
         if self.reflectance is self.transmittance or np.array_equal(self.reflectance, self.transmittance):
             return self.reflectance
         return np.where(wi[2] < 0, self.transmittance, self.reflectance)

@@ -59,10 +59,10 @@ class DiffuseTransmission(Bsdf):
         """Choose a side by u[2], and draw a cosine-weighted direction there."""
         wi, chance = cosine_hemisphere(u), self._chance()
         reflects = u[2] < chance
-        part = np.where(reflects, chance, f4(1) - chance)
-        pdf = part * (wi[2] * INV_PI)
+        side_chance = np.where(reflects, chance, f4(1) - chance)
+        pdf = side_chance * (wi[2] * INV_PI)
         tint = np.where(reflects, self.reflectance, self.transmittance)
-        weight = tint * ((pdf > 0) / np.maximum(part, TINY))
+        weight = tint * ((pdf > 0) / np.maximum(side_chance, TINY))
         wi[2] *= np.where(reflects, f4(1), f4(-1))
         return BsdfSample(wi, weight, pdf, broadcast(np.False_, len(pdf)))
 

@@ -36,7 +36,7 @@ class DisneyModel(LayeredBsdf):
         self.tangent = Tangent(np.zeros(1, f4)) if "anisotropic" in self.used else None
 
     def shared(self) -> dict[str, Any]:
-        """Return what their bases have in common."""
+        """Return the parameters that their bases share."""
         tangent = None if isinstance(self.tangent, BaseTexture) else self.tangent
         return {"tangent": tangent, **{name: getattr(self, name) for name in SHARED}}
 

@@ -6,7 +6,7 @@ and its sampling, as in E. Turquin 2019, "Practical Multiple Scattering Compensa
 whose factor 1/E(wo) is not reciprocal. Absorption deepens colors as in C. Kulla and A. Conty 2017,
 "Revisiting Physically Based Shading at Imageworks".
 
-Boundaries that refract: reflection is multiplied by the same c(wo)·c(wi), and what is still lost, L(w),
+Boundaries that refract: reflection is multiplied by the same c(wo)·c(wi), and the light still lost, L(w),
 returns as Kulla and Conty's lobe L(wo)·L(wi)/(π·mean L). As much of it crosses as the other side can return,
 times the mean transmittance: f·η² stays reciprocal.
 """
@@ -70,18 +70,18 @@ class Shape(NamedTuple):
 
 
 # Tables have axes for the side, `roughness`, `roughness_v`, the azimuth and the angle to the normal; axes of
-# what is constant or does not count have one entry.
+# constants, and of parameters without influence, have one entry.
 
 
 class Scaling(NamedTuple):
-    """How reflection grows."""
+    """The tables by which reflection grows."""
 
     factor: Floats  # (1, …) c
-    albedo: Floats  # (1, r, r) mean of what is scattered once
+    albedo: Floats  # (1, r, r) mean albedo of single scattering
 
 
 class Loss(NamedTuple):
-    """The lobe of what a boundary that refracts loses; its sides are outside and inside."""
+    """The lobe of the light that a dielectric boundary loses otherwise; its sides are outside and inside."""
 
     lost: Floats  # (2, …) L
     means: Floats  # (2, r, r) of L, times the square of the index of the side
@@ -107,9 +107,9 @@ class Loss(NamedTuple):
         """Return value and density, and the probability to sample it, if it is not known, (n,) each."""
         below = wi[2] < 0
         chance = self.at(bsdf, wo, inside, stretched[0]) if chance is None else chance
-        part, scale = self._sides(bsdf, inside, below)
+        share, scale = self._sides(bsdf, inside, below)
         value = chance * self.at(bsdf, wi, inside != below, stretched[1]) * scale
-        return value, bsdf.facets().wide_pdf(wi, stretched[1]) * part, chance
+        return value, bsdf.facets().wide_pdf(wi, stretched[1]) * share, chance
 
     def directions(self, bsdf: MicrofacetSurface, u: Floats, inside: Bools, lanes: Ints) -> Floats:
         """Return directions of the lobe (3, k) on some lanes, for u (3, n) and wo inside or not."""
@@ -122,7 +122,7 @@ class Loss(NamedTuple):
         return wi
 
     def _sides(self, bsdf: MicrofacetSurface, inside: Bools, below: Bools | bool) -> tuple[Floats, Floats]:
-        """Return the part of the lobe on a side of the boundary, and what products of L are scaled by."""
+        """Return the part of the lobe on a side of the boundary, and the factor of products of L."""
         out, in_ = (_of_roughness(bsdf, self.means, side) for side in (0, 1))
         least, squared = f4(self.passed) * np.minimum(out, in_), f4(self.ior * self.ior)
         cross = least / out, least / in_
@@ -152,12 +152,12 @@ def gain(
     mean_reflectance: Floats | None = None,
     stretched: tuple[Floats | None, Floats | None] = (None, None),
 ) -> Floats:
-    """Return by how much reflection grows, (n,); of a metal with a mean reflectance (3, n).
+    """Return the factor by which reflection grows, (n,); of a metal with a mean reflectance (3, n).
 
     `stretched` is as for `mirror_lobe`.
     """
     table, facets = scaling(bsdf.shape).factor, bsdf.facets()
-    places = (_place_of_masking(facets, *each) for each in zip((wo, wi), stretched, strict=True))
+    places = (_place_of_masking(facets, *pair) for pair in zip((wo, wi), stretched, strict=True))
     one, other = (_directional(bsdf, table, place) for place in places)
     if mean_reflectance is None:
         return one * other
@@ -165,7 +165,7 @@ def gain(
 
 
 def part_kept(bsdf: MicrofacetSurface, mean_reflectance: Floats) -> Floats:
-    """Return the part that a metal keeps of what it scatters more than once, beside the first F, (3, n).
+    """Return the part of multiple scattering that a metal does not absorb, beside the first F, (3, n).
 
     It is F·M/(1 − F·(1 − M)), with M the mean albedo of single scattering (Kulla and Conty).
     """
@@ -191,7 +191,7 @@ def _column_of_refraction(z: Any, stretched: Any) -> Any:
 
 
 def _directional(bsdf: MicrofacetSurface, table: Floats, place: Place, side: Bools | int = 0) -> Floats:
-    """Return what a table (sides, …) has for directions at a place, (n,)."""
+    """Return the values (n,) of a table (sides, …) for directions at a place."""
     turn, column = place
     if table.shape[-1] == FINE:
         nearest = (column * f4(FINE - 1) + f4(0.5)).astype(np.intp)
@@ -200,7 +200,7 @@ def _directional(bsdf: MicrofacetSurface, table: Floats, place: Place, side: Boo
 
 
 def _of_roughness(bsdf: MicrofacetSurface, table: Floats, side: Bools | int = 0) -> Floats:
-    """Return what a table (sides, r, r) has for the roughnesses of a BSDF, (n,) or (1,)."""
+    """Return the values, (n,) or (1,), of a table (sides, r, r) for the roughnesses of a BSDF."""
     return interpolate(table, (bsdf.roughness, bsdf.roughness_v), np.atleast_1d(side))
 
 
@@ -226,8 +226,8 @@ def loss(shape: Shape, ior: float) -> Loss:
 def _tabulate(shape: Shape, pair: Callable[[Shape], tuple[Doubles, Doubles]]) -> list[Doubles]:
     """Return the tables that `pair` gives for constants, of all roughnesses that vary: (sides, r, r, …)."""
     along, across = _roughnesses(shape.alpha), _roughnesses(shape.alpha_v) if shape.brushed else [None]
-    parts = [[pair(shape._replace(alpha=a, alpha_v=b)) for b in across] for a in along]
-    tables = [np.array([[each[k] for each in row] for row in parts]) for k in (0, 1)]
+    cells = [[pair(shape._replace(alpha=a, alpha_v=b)) for b in across] for a in along]
+    tables = [np.array([[cell[k] for cell in row] for row in cells]) for k in (0, 1)]
     for axis in (0, 1):
         tables = [_at_roughnesses(table, axis) for table in tables]
     return [np.moveaxis(table, 2, 0) for table in tables]
@@ -241,11 +241,11 @@ def _at_roughnesses(table: Doubles, axis: int) -> Doubles:
     """Return a table of `NODES` along an axis at `ROUGHNESSES`, by the polynomial through them."""
     if table.shape[axis] == 1:
         return table
-    table, parts = np.moveaxis(table, axis, 0), np.ones((NODES.size, ROUGHNESSES.size))
+    table, basis = np.moveaxis(table, axis, 0), np.ones((NODES.size, ROUGHNESSES.size))
     for k, j in np.ndindex(NODES.size, NODES.size):
         if j != k:
-            parts[k] *= (ROUGHNESSES - NODES[j]) / (NODES[k] - NODES[j])
-    total = sum(np.multiply.outer(part, each) for part, each in zip(parts, table, strict=True))
+            basis[k] *= (ROUGHNESSES - NODES[j]) / (NODES[k] - NODES[j])
+    total = sum(np.multiply.outer(weight, values) for weight, values in zip(basis, table, strict=True))
     return np.moveaxis(total, 0, axis)
 
 
@@ -272,8 +272,8 @@ def _scaling_of_pair(shape: Shape) -> tuple[Doubles, Doubles]:
             corners = [(j * COLUMNS + i, y * x) for j, y in _neighbors(row, TURNS) for i, x in corners]
         total = turns.size * COLUMNS
         start = np.arange(COLUMNS).repeat(weight.size // COLUMNS) * total
-        parts = [np.bincount(start + i, weight * part, COLUMNS * total) for i, part in corners]
-        kernels.append(sum(parts[1:], parts[0]).reshape(COLUMNS, total) * (COLUMNS / weight.size))
+        sums = [np.bincount(start + i, weight * share, COLUMNS * total) for i, share in corners]
+        kernels.append(sum(sums[1:], sums[0]).reshape(COLUMNS, total) * (COLUMNS / weight.size))
     kernel = np.concatenate(kernels)
     factor = np.ones(len(kernel))
     for _ in range(STEPS):
@@ -305,8 +305,8 @@ def _loss_of_pair(shape: Shape, ior: float, size: Size) -> tuple[Doubles, Double
             reflected, cos_refracted = fresnel_dielectric(seen, index)
             wi = refract(wo, m, seen, cos_refracted, index)
             below = np.where(wi[2] < 0, facets.weight(wo, wi, m), f4(0))
-            kept = reflected * above + (f4(1) - reflected) * below
-            lost[side, k] = 1 - kept.reshape(size.columns, -1).mean(1, dtype=float)
+            energy = reflected * above + (f4(1) - reflected) * below
+            lost[side, k] = 1 - energy.reshape(size.columns, -1).mean(1, dtype=float)
     lost = np.clip(lost, LEAST, 1)
     return lost, _means(facets, lost, _place_of_refraction) * np.array([1, ior**2])
 

@@ -42,8 +42,8 @@ class Measured(JointBsdf):
     Parameters
     ----------
     path
-        The file; its kind is told by its first bytes. Spectra become colors under D65, and what is out of
-        gamut is clipped.
+        The file; its kind is told by its first bytes. Spectra become colors under D65, and those out of
+        gamut are clipped.
     rotation
         Degrees by which an anisotropic material is turned from the direction of growing u of the texture
         coordinates towards v: a number or a texture.
@@ -75,17 +75,17 @@ class Measured(JointBsdf):
         return made
 
     def _fill(self, name: str, data: bytes, rotation: Scalar) -> None:
-        found = parsed_measurement(name, data)
+        tables = parsed_measurement(name, data)
         self.path = name
         try:
-            self.data = _Adaptive(found) if isinstance(found, AdaptiveTables) else _Merl(found)
+            self.data = _Adaptive(tables) if isinstance(tables, AdaptiveTables) else _Merl(tables)
         except SceneError as error:
             raise SceneError(f"{name}: {error}") from error
         self.rotation = rotation
         self.derive()
 
     def derive(self) -> None:
-        """Set what tells the direction of an anisotropic material."""
+        """Set the tangent of an anisotropic material."""
         self.tangent: Any = Tangent(self.rotation) if self.data.mirrors else None
 
     def evaluate(self, wo: Floats, wi: Floats) -> tuple[Floats, Floats]:
@@ -225,7 +225,7 @@ class _Merl(_Tables):
         m, tables = _normals_at(at), []
         for angle in self.theta:
             sin, cos = sin_cos(angle)
-            wo = np.stack([broadcast(part, m.shape[1]) for part in (sin, f4(0), cos)])
+            wo = np.stack([broadcast(component, m.shape[1]) for component in (sin, f4(0), cos)])
             wi = reflect(wo, m)
             wi[2] = np.maximum(wi[2], f4(0))
             lit = wi[2] * dot(wo, m) > 0

@@ -56,8 +56,8 @@ class Mix(JointBsdf):
     @property
     def index_inside(self) -> Any:
         """The index of refraction of both BSDFs, one after the other if they differ."""
-        found = [each.index_inside for each in (self.first, self.second) if each.encloses]
-        known = [index for index in found if index is not None]
+        indices = [bsdf.index_inside for bsdf in (self.first, self.second) if bsdf.encloses]
+        known = [index for index in indices if index is not None]
         varying = [index for index in known if isinstance(index, BaseTexture)]
         if varying or len(known) < 2:
             return (varying + known)[0] if known else None

@@ -1,7 +1,7 @@
 """The scattering of OpenPBR: a coat and fuzz over metal, glossy diffuse and clear parts.
 
-Source: the OpenPBR Surface specification 1.1 (Academy Software Foundation, 2024). docs/openpbr.md lists what
-differs from it.
+Source: the OpenPBR Surface specification 1.1 (Academy Software Foundation, 2024). docs/openpbr.md lists the
+differences.
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ from .microfacet import alpha_of
 from .rough import Tangent
 
 MICROMETERS = f4(1000)  # in nanometers
-# what the roughness of the facets depends on
+# parameters that the roughness of the facets depends on
 ROUGHNESS = {"specular_roughness", "specular_roughness_anisotropy", "coat_roughness", "coat_weight"}
 
 
@@ -97,11 +97,11 @@ class OpenPBRBsdf(LayeredBsdf):
     @property
     def index_inside(self) -> Any:
         """Index of refraction of the clear part, which `specular_weight` changes."""
-        varies = any(isinstance(each, BaseTexture) for each in (self.specular_ior, self.specular_weight))
+        varies = any(isinstance(param, BaseTexture) for param in (self.specular_ior, self.specular_weight))
         return self.specular_ior if varies else weighted_index(self.specular_ior, self.specular_weight)
 
     def derive(self) -> None:
-        """Set which layers exist, and what tables of lost light depend on."""
+        """Set which layers exist, and the shape that tables of lost light depend on."""
         super().derive()
         textures = {name for name, value in vars(self).items() if isinstance(value, BaseTexture)}
         self.transmissive = "transmission_weight" in self.used
@@ -126,12 +126,12 @@ class OpenPBRBsdf(LayeredBsdf):
         if {"thin_film_weight", "thin_film_thickness"} <= {*self.used}:
             film = Film(self.thin_film_thickness * MICROMETERS, self.thin_film_ior, self.thin_film_weight)
         along, across = self._roughness()
-        own, subsurface = self.base_weight * self.base_color, self.subsurface_weight
-        both = own + (self.subsurface_color - own) * subsurface
+        color, subsurface = self.base_weight * self.base_color, self.subsurface_weight
+        both = color + (self.subsurface_color - color) * subsurface
         matte: Matte = Lambertian(both)
         if "base_diffuse_roughness" in self.used:
             matte = RoughMatte(
-                own * (f4(1) - subsurface), self.base_diffuse_roughness, self.subsurface_color * subsurface
+                color * (f4(1) - subsurface), self.base_diffuse_roughness, self.subsurface_color * subsurface
             )
         around = f4(1) + (self.coat_ior - f4(1)) * self.coat_weight
         below = weighted_index(self.specular_ior / around, self.specular_weight)
@@ -145,7 +145,7 @@ class OpenPBRBsdf(LayeredBsdf):
             color=both,
             metallic=self.base_metalness,
             transmission=self.transmission_weight,
-            metal=TintedMetal(own, f4(1) - self.specular_color, weight, film),
+            metal=TintedMetal(color, f4(1) - self.specular_color, weight, film),
             gloss=gloss,
             matte=matte,
             clear=self._clear(film) if self.transmissive else None,
@@ -192,7 +192,7 @@ class OpenPBRBsdf(LayeredBsdf):
 
 
 def _darkened(base: MetallicBase, index: Floats, coat_ior: Floats, darkening: Floats) -> Floats:
-    """Return what is left of light that a coat throws back to the base, (3, n) (specification, Δ)."""
+    """Return the factor (3, n) of light after reflections between coat and base (specification, Δ)."""
     outside, below = (
         mean_over_cosines(lambda mu, eta=eta: fresnel_dielectric(mu, eta)[0])  # type: ignore[misc]
         for eta in (coat_ior, index)

@@ -57,10 +57,10 @@ class OrenNayar(Bsdf):
     energy_preserving: Parameter[bool] = Parameter(flag, default=False, kw_only=True)
 
     def derive(self) -> None:
-        """Check what the model that preserves energy asks for."""
+        """Check the roughness of the model that preserves energy."""
         if self.energy_preserving and not isinstance(self.sigma, BaseTexture) and self.sigma[0] > 1:
-            found = brief(self.sigma)
-            raise SceneError(f"OrenNayar sigma is {found}; it must be in [0, 1] to preserve energy")
+            sigma = brief(self.sigma)
+            raise SceneError(f"OrenNayar sigma is {sigma}; it must be in [0, 1] to preserve energy")
 
     def albedo(self, wo: Floats) -> Floats:
         """Return the reflectance, about which the part of the scattered light varies with `wo`."""

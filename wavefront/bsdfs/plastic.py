@@ -20,7 +20,7 @@ from .rough import Distribution, Microfacets, Shadowing, distribution_of, shadow
 
 COSINES = 64  # columns of a table: cosines in [0, 1]
 ROWS = 41  # rows of a table for textures: roughnesses in [0, 1]
-LEAST = 1e-30  # mean of what gets in, where a table has nothing
+LEAST = 1e-30  # mean of the light that gets in, where a table has 0
 
 
 @parametrized
@@ -40,14 +40,15 @@ class Plastic(Microfacets):
     ior
         Refractive index of the inside relative to the outside, a number from 1e-6 to 1e6.
     specular_reflectance
-        Tint of what the boundary reflects, per channel, in [0, 1]. 1 is physical.
+        Tint of reflection at the boundary, per channel, in [0, 1]. 1 is physical.
     nonlinear
         The base colors light at each of its reflections, so that colors become more saturated. False: once.
     distribution, shadowing
         As for `Conductor`.
     multiscatter
-        All light that a rough boundary does not reflect gets to the base. False: what its microfacets refract
-        once, as in Mitsuba, so that with `reflectance` 1 about 2 % is lost at roughness 0.05 and 70 % at 1.
+        All light that a rough boundary does not reflect gets to the base. False: only light that the facets
+        refract once, as in Mitsuba, so that with `reflectance` 1 about 2 % is lost at roughness 0.05 and 70 %
+        at 1.
 
     Raises
     ------
@@ -108,7 +109,7 @@ class Plastic(Microfacets):
         return f + self.specular_reflectance * (value * reflected), pdf + density * chance
 
     def sample_f(self, wo: Floats, u: Floats) -> BsdfSample:
-        """Reflect at the boundary, or scatter at the base, by u[2] and about what each reflects."""
+        """Reflect at the boundary, or scatter at the base, by u[2] and their approximate albedos."""
         through, _, _ = self._boundary(wo[2])
         chance = self._chance(through)
         glossy = u[2] < chance
@@ -118,12 +119,12 @@ class Plastic(Microfacets):
         weight = weigh(f, wi, pdf)
         if not self._smooth:
             return BsdfSample(wi, weight, pdf, np.zeros(len(pdf), np.bool_))
-        part = (f4(1) - through) / np.where(chance > 0, chance, f4(1))
-        weight = np.where(glossy, self.specular_reflectance * part, weight)
+        scale = (f4(1) - through) / np.where(chance > 0, chance, f4(1))
+        weight = np.where(glossy, self.specular_reflectance * scale, weight)
         return BsdfSample(wi, weight, np.where(glossy, chance, pdf), glossy)
 
     def _base(self, escaping: Floats) -> Floats:
-        """Part of what gets in that gets out, after all reflections between base and boundary, (3, n)."""
+        """Part of the light below the boundary that gets out, after all reflections at the base, (3, n)."""
         if not self.nonlinear:
             return self.reflectance
         out = self.reflectance * escaping
@@ -154,7 +155,7 @@ class Plastic(Microfacets):
         y, flat, corner = y - j.astype(f4), through.ravel(), j * COSINES + i
         low = flat.take(corner) * (f4(1) - x) + flat.take(corner + 1) * x
         high = flat.take(corner + COSINES) * (f4(1) - x) + flat.take(corner + COSINES + 1) * x
-        mean, escaping = (part.take(j) * (f4(1) - y) + part.take(j + 1) * y for part in parts)
+        mean, escaping = (table.take(j) * (f4(1) - y) + table.take(j + 1) * y for table in parts)
         return low * (f4(1) - y) + high * y, mean, escaping
 
 
@@ -174,11 +175,11 @@ def part_escaping(ior: float) -> float:
 def boundary_tables(
     ior: float, roughness: float | None, beckmann: bool, separable: bool, multiscatter: bool
 ) -> tuple[Floats, Floats, Floats]:
-    """Return what gets in through rough boundaries (r, COSINES), its mean, and what gets out (r,).
+    """Return the light that gets in through rough boundaries (r, COSINES), its mean, and that gets out (r,).
 
     Rows are one roughness, or `ROWS` from 0 to 1. With multiple scattering all gets through that the rarer
     side does not reflect. Without, as in Mitsuba 3's `roughplastic`, a mean over diffuse light is that of the
-    columns, 1.5 % less than the integral, and what gets in is what gets out times η².
+    columns, 1.5 % less than the integral, and the light that gets in is η² times that which gets out.
     """
     cos, mu = np.linspace(0, 1, COSINES), (np.arange(4096) + 0.5) / 4096
     rows = np.linspace(0, 1, ROWS) if roughness is None else np.array([roughness])
@@ -193,7 +194,7 @@ def boundary_tables(
             continue
         through.append(np.maximum(1 - reflected(ior), 0))
         rarer = through[-1] if ior >= 1 else 1 - reflected(1 / ior)
-        entering, passing = ((2 * mu * np.interp(mu, cos, part)).mean() for part in (through[-1], rarer))
+        entering, passing = ((2 * mu * np.interp(mu, cos, passed)).mean() for passed in (through[-1], rarer))
         mean.append(max(entering, LEAST))
         escaping.append(passing / max(ior, 1) ** 2)
     return np.array(through, np.float32), np.array(mean, np.float32), np.array(escaping, np.float32)
@@ -215,11 +216,11 @@ def _directional(facets: Facets, eta: float, refracted: bool) -> Doubles:
         if refracted:
             wi = refract(wo, m, cos, cos_refracted, index)
             value, pdf, _, _ = facets.refraction_lobe(wo, wi, index)
-            part = (f4(1) - reflected) * index * index
+            factor = (f4(1) - reflected) * index * index
         else:
-            wi, part = reflect(wo, m), reflected
+            wi, factor = reflect(wo, m), reflected
             value, pdf, _ = facets.mirror_lobe(wo, wi)
-        each = part * np.abs(wi[2]) * value / np.where(pdf > 0, pdf, f4(1))
-        # the sum of the second is about 1: what Beckmann's approximate masking is off
-        out[k] = (each * weight).sum(dtype=float) / (facets.visible_weight(wo, m) * weight).sum(dtype=float)
+        term = factor * np.abs(wi[2]) * value / np.where(pdf > 0, pdf, f4(1))
+        # the sum of the second is about 1: it corrects Beckmann's approximate masking
+        out[k] = (term * weight).sum(dtype=float) / (facets.visible_weight(wo, m) * weight).sum(dtype=float)
     return out

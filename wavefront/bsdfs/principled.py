@@ -75,7 +75,7 @@ class Principled(LayeredBsdf):
         Layer the specular lobe over the diffuse base without a gain of energy. False follows glTF's appendix
         exactly, also without multiple scattering.
     multiscatter
-        Return what the microfacets of metal and clear parts scatter more than once, as in `Conductor` and
+        Add multiple scattering by the microfacets of metal and clear parts, as in `Conductor` and
         `Dielectric`; not in clear parts that bend light with an index by texture, or in scenes with a
         `priority`.
 
@@ -113,7 +113,7 @@ class Principled(LayeredBsdf):
     multiscatter: Parameter[bool] = Parameter(flag, default=True, kw_only=True)
 
     def derive(self) -> None:
-        """Set which layers exist, and what tables of lost light depend on."""
+        """Set which layers exist, and the shape that tables of lost light depend on."""
         super().derive()
         self.transmissive = "transmission" in self.used
         again = self.multiscatter and self.conserve_energy

@@ -94,13 +94,13 @@ class Microfacets(MicrofacetSurface, JointBsdf):
     multiscatter: Any = False
 
     def derive(self) -> None:
-        """Set `specular` from the roughness, and what tells its direction."""
+        """Set `specular` from the roughness, and the tangent."""
         across = self.roughness if self.roughness_v is None else self.roughness_v
         self.specular = is_smooth(self.roughness) and is_smooth(across)
         self._set_shape()
 
     def _set_shape(self) -> None:
-        """Set the tangent, and what tables of lost light depend on."""
+        """Set the tangent, and the shape that tables of lost light depend on."""
         self.tangent = None if self.roughness_v is None else Tangent(self.rotation)
         known = [
             None

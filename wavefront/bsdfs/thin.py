@@ -24,7 +24,7 @@ class ThinDielectric(RefractiveBsdf):
     Parameters
     ----------
     ior
-        Refractive index of the material relative to what surrounds it, from 1e-6 to 1e6.
+        Refractive index of the material relative to the medium around it, from 1e-6 to 1e6.
     roughness
         In [0, 1]; α = roughness². Below α = 0.001 it is perfectly smooth.
     reflectance, transmittance
@@ -59,8 +59,8 @@ class ThinDielectric(RefractiveBsdf):
             value = value * gain(self, wo, upper)
         reflected = self._reflected(cos)
         above = wi[2] > 0
-        part = np.where(above, reflected, f4(1) - reflected)
-        return np.where(above, self.reflectance, self.transmittance) * (value * part), density * part
+        share = np.where(above, reflected, f4(1) - reflected)
+        return np.where(above, self.reflectance, self.transmittance) * (value * share), density * share
 
     def sample_f(self, wo: Floats, u: Floats) -> BsdfSample:
         """Reflect with the probability of the sheet's reflectance (by u[2]), else go through."""

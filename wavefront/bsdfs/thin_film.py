@@ -58,7 +58,7 @@ def film_reflectance(
     thickness
         (n,) of the film, nanometers.
     film, before, beyond
-        (n,) or (3, n) refractive indices of the film, and of what is before and below it.
+        (n,) or (3, n) refractive indices of the film, and before and below it.
     k
         (3, n) extinction below it.
     """
@@ -110,7 +110,7 @@ def _interference(path: Floats) -> tuple[Floats, Floats]:
         height = f4(amplitude * (2 * np.pi * variance) ** 0.5 / WHITE) * exp(-turns * turns)
         for channel in range(3):
             share = f4(SHARES[channel, function])
-            own = channel if path.ndim == 2 else slice(None)
-            cosines[channel] += share * (height * cos)[own]
-            sines[channel] += share * (height * sin)[own]
+            row = channel if path.ndim == 2 else slice(None)
+            cosines[channel] += share * (height * cos)[row]
+            sines[channel] += share * (height * sin)[row]
     return cosines, sines

@@ -40,7 +40,7 @@ class Clear:
         return np.zeros(1, np.bool_) if self.back_facing is None else self.back_facing
 
     def loss(self, shape: Shape) -> Loss:
-        """Return what the boundary loses, of microfacets of a shape."""
+        """Return the lobe of the light that the boundary loses, of microfacets of a shape."""
         assert self.boundary is not None
         return loss(shape, self.boundary)
 

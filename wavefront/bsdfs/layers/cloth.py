@@ -26,7 +26,7 @@ class Sheen(Cover):
         return weights._replace(diffuse=weights.diffuse + more)
 
     def over(self, f: Floats, pdf: Floats, wo: Floats, wi: Floats, chances: Chances) -> tuple[Floats, Floats]:
-        """Return `f` and `pdf` of the fibers over what is below them."""
+        """Return `f` and `pdf` of the fibers over the layers below."""
         return self._passed(wo, wi) * f + self.color * (
             self.strength * sheen_lobe(wo, wi, self.roughness)
         ), pdf
@@ -52,7 +52,7 @@ class Fuzz(Cover):
         return weights._replace(fuzz=self.color.max(0) * seen / (f4(1) - seen))
 
     def over(self, f: Floats, pdf: Floats, wo: Floats, wi: Floats, chances: Chances) -> tuple[Floats, Floats]:
-        """Return `f` and `pdf` of the fibers over what is below them."""
+        """Return `f` and `pdf` of the fibers over the layers below."""
         value, density, albedo = fuzz_lobe(wo, wi, self.roughness)
         f = f * (f4(1) - self.weight * albedo) + self.color * (self.weight * value)
         return f, pdf + chances.fuzz * density

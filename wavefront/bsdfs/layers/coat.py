@@ -41,7 +41,7 @@ class Varnish(Cover):
         return facets._replace(alpha=np.where(chosen, varnish, alpha), alpha_v=across).visible_normals(wo, u)
 
     def over(self, f: Floats, pdf: Floats, wo: Floats, wi: Floats, chances: Chances) -> tuple[Floats, Floats]:
-        """Return `f` and `pdf` of the coat over what is below it."""
+        """Return `f` and `pdf` of the coat over the layers below."""
         value, density, cos = Facets(alpha_of(self.roughness)).mirror_lobe(wo, wi)
         through = self.through(wo[2]) * self.through(np.abs(wi[2]))
         f = f * through + value * self.strength * schlick(COAT_F0, cos)
@@ -57,11 +57,11 @@ class Coat(Varnish):
     """The coat of OpenPBR, which absorbs."""
 
     ior: Floats  # (n,)
-    color: Floats  # (3, n) what is left of light that passes twice along the normal
-    darkened: Floats  # (3, n) part that is left of light that the coat throws back to the base
+    color: Floats  # (3, n) transmittance of light that passes twice along the normal
+    darkened: Floats  # (3, n) factor of light after reflections between coat and base
 
     def over(self, f: Floats, pdf: Floats, wo: Floats, wi: Floats, chances: Chances) -> tuple[Floats, Floats]:
-        """Return `f` and `pdf` of the coat over what is below it."""
+        """Return `f` and `pdf` of the coat over the layers below."""
         value, density, cos = Facets(alpha_of(self.roughness)).mirror_lobe(wo, wi)
         zo, zi = wo[2], np.abs(wi[2])
         lost = np.maximum(*(dielectric_albedo(self.ior, self.roughness, z) for z in (zo, zi)))

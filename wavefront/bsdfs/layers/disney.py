@@ -63,10 +63,10 @@ class DisneyBase(Base):
         flat = f4(1.25) * (below * (f4(1) / np.maximum(wo[2] + zi, TINY) - f4(0.5)) + f4(0.5))
         return self.base_color * ((diffuse + (flat - diffuse) * self.flatness) * INV_PI)
 
-    def fibers(self, cos: Floats, part: Floats) -> Floats:
+    def fibers(self, cos: Floats, share: Floats) -> Floats:
         """Return the light that grazes cloth on a part of the surface, (3, n)."""
         hue = f4(1) + (self._hue() - f4(1)) * self.sheen_tint
-        return hue * (self.sheen * part * _fifth(cos))
+        return hue * (self.sheen * share * _fifth(cos))
 
 
 @dataclass(eq=False, kw_only=True)
@@ -78,7 +78,7 @@ class DisneySolid(DisneyBase):
     front: Floats  # (n,) 1 where wo is outside, else 0: there is only glass
 
     def __post_init__(self) -> None:
-        """Compute what all lobes ask for."""
+        """Compute the values that all lobes share."""
         self.clear = (f4(1) - self.metallic) * self.transmission * np.ones_like(self.front)
         self.eta = np.where(self.front == 0, f4(1) / self.ior, self.ior)
 
@@ -90,7 +90,7 @@ class DisneySolid(DisneyBase):
         return Chances(gloss, diffuse=matte)
 
     def share(self, total: Floats) -> Floats:
-        """Return by what weights of this sum are multiplied: samples of lobes that are not there are lost."""
+        """Return the factor of weights of this sum: samples of absent lobes are lost."""
         return f4(1) / np.maximum(total, f4(1))
 
     def evaluate(self, wo: Floats, wi: Floats, chances: Chances) -> tuple[Floats, Floats]:
@@ -195,7 +195,7 @@ class DisneySheet(DisneyBase):
 
 @soa
 class DisneyCoat(Cover):
-    """The varnish (GTR1, Burley 2012, eq. 4), which takes no light from what is below."""
+    """The varnish (GTR1, Burley 2012, eq. 4), which takes no light from the layers below."""
 
     strength: Floats  # (n,)
     shine: Floats  # (n,) from 0 to 1
@@ -211,11 +211,11 @@ class DisneyCoat(Cover):
         cos2 = (f4(1) - exp(log(a2) * (f4(1) - u[1]))) / (f4(1) - a2)
         radius = np.sqrt(np.maximum(f4(1) - cos2, f4(0)))
         sin, cos = sin_cos_turns(u[0])
-        own = np.stack([radius * cos, radius * sin, np.sqrt(np.maximum(cos2, f4(0)))])
-        return np.where(chosen, own, facets.visible_normals(wo, u))
+        coat_normals = np.stack([radius * cos, radius * sin, np.sqrt(np.maximum(cos2, f4(0)))])
+        return np.where(chosen, coat_normals, facets.visible_normals(wo, u))
 
     def over(self, f: Floats, pdf: Floats, wo: Floats, wi: Floats, chances: Chances) -> tuple[Floats, Floats]:
-        """Return `f` and `pdf` of the coat and of what is below it."""
+        """Return `f` and `pdf` of the coat and of the layers below."""
         h, a2, above = wo + wi, self._alpha2(), np.where(wi[2] > 0, self.front, f4(0))
         h2 = np.maximum(dot(h, h), TINY)
         cos2, cos = h[2] * h[2] / h2, np.minimum(f4(0.5) * np.sqrt(dot(h, h)), f4(1))

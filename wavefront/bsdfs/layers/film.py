@@ -20,7 +20,7 @@ class Film:
     weight: Any = None  # (n,) part of the surface that it covers; None for all
 
     def over(self, cos: Floats, f0: Floats) -> Floats:
-        """Return the reflectance below the film, (3, n), of what reflects f0 along the normal in air."""
+        """Return the reflectance (3, n) of a film over a surface that reflects f0 along the normal in air."""
         root = np.sqrt(np.minimum(f0, f4(0.9999)))
         index = (f4(1) + root) / (f4(1) - root)
         return film_reflectance(cos, self.thickness, self.ior, f4(1), index)

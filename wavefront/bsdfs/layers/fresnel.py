@@ -15,5 +15,5 @@ def fifth(cos: Floats) -> Floats:
 
 
 def schlick(f0: float, cos: Floats) -> Floats:
-    """Return the reflectance of what reflects f0 along the normal, (n,)."""
+    """Return the reflectance (n,) of a surface that reflects f0 along the normal."""
     return f4(f0) + f4(1 - f0) * fifth(cos)

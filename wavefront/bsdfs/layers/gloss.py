@@ -1,4 +1,4 @@
-"""The gloss of opaque dielectrics: what it reflects, and what reaches the matte part below it."""
+"""The gloss of opaque dielectrics: its reflection, and the light that reaches the matte part below."""
 
 from __future__ import annotations
 
@@ -88,7 +88,7 @@ class SchlickGloss(Gloss):
 class FresnelGloss(Gloss):
     """The gloss of OpenPBR, by Fresnel's equations."""
 
-    index: Floats  # (n,) relative to what is above, at least 1
+    index: Floats  # (n,) relative to the medium above, at least 1
     weight: Floats
     tint: Floats  # (3, n)
     film: Film | None = None
@@ -121,7 +121,7 @@ class FresnelGloss(Gloss):
         return self.passed(roughness, None)
 
     def _film_adds(self, film: Film, cos: Floats) -> Floats:
-        """Return what a film adds to the reflectance, (3, n)."""
+        """Return the reflectance (3, n) that a film adds."""
         root = (self.index - f4(1)) / (self.index + f4(1))
         shape = np.broadcast_shapes(root.shape, cos.shape)
         below = film.over(cos, np.broadcast_to(root * root, shape))

@@ -1,4 +1,4 @@
-"""Layers: a base, and what lies on it. Each material model maps its parameters to them."""
+"""Layers: a base, and covers on it. Each material model maps its parameters to them."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ class Chances(NamedTuple):
     gloss: Floats = NONE  # reflection in the base's microfacets
     glass: Floats = NONE  # reflection or refraction in them, by Fresnel
     coat: Floats = NONE  # reflection in the coat
-    again: Floats = NONE  # what the microfacets of clear parts scatter more than once, on both sides
+    again: Floats = NONE  # multiple scattering by the microfacets of clear parts, on both sides
     diffuse: Floats = NONE  # cosine-weighted
     fuzz: Floats = NONE  # fibers
 
@@ -39,18 +39,18 @@ class Drawn(NamedTuple):
 
 
 class Cover(ABC):
-    """What lies on a base."""
+    """A layer on a base."""
 
     # draws facets of the coat: of the base's facets, wo, u, and where the coat is chosen
     normals: Callable[[Facets, Floats, Floats, Bools], Floats] | None = None
 
     @abstractmethod
     def weigh(self, weights: Chances, wo: Floats) -> Chances:
-        """Return weights of the lobes with that of this layer, about what it reflects."""
+        """Return weights of the lobes with that of this layer, its approximate albedo."""
 
     @abstractmethod
     def over(self, f: Floats, pdf: Floats, wo: Floats, wi: Floats, chances: Chances) -> tuple[Floats, Floats]:
-        """Return `f` (3, n) and `pdf` (n,) of this layer over what is below it, whose values are given."""
+        """Return `f` (3, n) and `pdf` (n,) of this layer over those below, whose values are given."""
 
     def directions(self, wi: Floats, wo: Floats, u: Floats, chances: Chances) -> Floats:
         """Return directions (3, n), in place of some of which this layer draws its own."""
@@ -62,10 +62,10 @@ class Base(ABC):
 
     @abstractmethod
     def weights(self, wo: Floats) -> Chances:
-        """Return about what each of its lobes reflects."""
+        """Return the approximate albedos of its lobes."""
 
     def share(self, total: Floats) -> Floats:
-        """Return by what weights of this sum are multiplied to be chances, (n,)."""
+        """Return the factor (n,) that turns weights of this sum into chances."""
         return f4(1) / np.where(total > 0, total, f4(1))
 
     @abstractmethod
@@ -93,7 +93,7 @@ class Layers:
         self.coat = next((cover for cover in covers if cover.normals is not None), None)
 
     def chances(self, wo: Floats) -> Chances:
-        """Share the samples out by about what each lobe reflects; none that has no value gets any."""
+        """Return the probabilities of the lobes, by their approximate albedos; 0 for absent lobes."""
         weights = self.base.weights(wo)
         for cover in self.covers:
             weights = cover.weigh(weights, wo)

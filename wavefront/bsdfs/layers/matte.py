@@ -18,8 +18,8 @@ class Matte(ABC):
     """A matte part."""
 
     @abstractmethod
-    def f(self, wo: Floats, wi: Floats, part: Floats) -> Floats:
-        """Return the value (3, n) of what is a part (n,) of the surface."""
+    def f(self, wo: Floats, wi: Floats, weight: Floats) -> Floats:
+        """Return the value (3, n), times a weight (n,)."""
 
 
 @soa
@@ -28,9 +28,9 @@ class Lambertian(Matte):
 
     color: Floats  # (3, n)
 
-    def f(self, wo: Floats, wi: Floats, part: Floats) -> Floats:
-        """Return the value (3, n) of what is a part (n,) of the surface."""
-        return self.color * (part * np.where(wi[2] > 0, INV_PI, f4(0)))
+    def f(self, wo: Floats, wi: Floats, weight: Floats) -> Floats:
+        """Return the value (3, n), times a weight (n,)."""
+        return self.color * (weight * np.where(wi[2] > 0, INV_PI, f4(0)))
 
 
 @soa
@@ -41,9 +41,9 @@ class RoughMatte(Matte):
     roughness: Floats  # (n,)
     subsurface: Floats  # (3, n) color of the second
 
-    def f(self, wo: Floats, wi: Floats, part: Floats) -> Floats:
-        """Return the value (3, n) of what is a part (n,) of the surface."""
-        above = part * np.where(wi[2] > 0, INV_PI, f4(0))
+    def f(self, wo: Floats, wi: Floats, weight: Floats) -> Floats:
+        """Return the value (3, n), times a weight (n,)."""
+        above = weight * np.where(wi[2] > 0, INV_PI, f4(0))
         rough = copy(ROUGH)
         vars(rough).update(reflectance=self.color, sigma=self.roughness)
-        return rough.f(wo, wi) * part + self.subsurface * above
+        return rough.f(wo, wi) * weight + self.subsurface * above

@@ -54,7 +54,7 @@ class TintedMetal(Metal):
     """A metal with a tint at about 82° (OpenPBR's specification, section on metal)."""
 
     color: Floats  # (3, n) reflectance along the normal
-    edge: Floats  # (3, n) what it absorbs at `F82` beyond Schlick's approximation
+    edge: Floats  # (3, n) absorption at `F82` beyond Schlick's approximation
     weight: Floats  # (n,) of the reflectance
     film: Film | None = None
 

@@ -37,11 +37,13 @@ class MetallicBase(MicrofacetSurface, Base):
     gloss: Gloss
     matte: Matte
     clear: Clear | None  # None in opaque materials
-    metal_again: bool = False  # what the facets of the metal scatter more than once returns
-    layered: bool = True  # the matte part gets what the gloss does not reflect; else by Fresnel in the facets
+    metal_again: bool = False  # with multiple scattering by the facets of the metal
+    layered: bool = (
+        True  # all light that the gloss does not reflect gets below; else by Fresnel in the facets
+    )
 
     def weights(self, wo: Floats) -> Chances:
-        """Return about what each lobe reflects."""
+        """Return the approximate albedo of each lobe."""
         weight = fifth(wo[2])
         opaque = (f4(1) - self.metallic) * (f4(1) - self.transmission)
         seen = luminance(self.gloss.schlick(weight))
@@ -70,19 +72,19 @@ class MetallicBase(MicrofacetSurface, Base):
         pdf = chances.gloss * density + chances.diffuse * cosine_hemisphere_pdf(wi)
         if self.clear is None:
             return f, pdf
-        clear, part = self.clear, (f4(1) - self.metallic) * self.transmission
+        clear, weight = self.clear, (f4(1) - self.metallic) * self.transmission
         reflected, _ = clear.fresnel(cos)
         through, through_density = clear.through(wo, wi, facets)
         pdf = pdf + chances.glass * (density * mean_of_channels(reflected) + through_density)
         if clear.again:
             grown = gain(self, wo, wi, None, both)
             value, through = value * grown, through * grown if clear.thin else through
-        once = value * reflected * (clear.shine * part) + clear.tint * (through * part)
+        once = value * reflected * (clear.shine * weight) + clear.tint * (through * weight)
         if clear.boundary is None:
             return f + once, pdf
         added, spread, _ = clear.loss(self.shape).lobe(self, wo, wi, clear.inside, both)
         tint = np.where(wi[2] < 0, clear.tint, clear.shine)
-        return f + once + tint * (added * part), pdf + chances.again * spread
+        return f + once + tint * (added * weight), pdf + chances.again * spread
 
     def directions(self, wo: Floats, u: Floats, chances: Chances, coat: Cover | None) -> Drawn:
         """Return directions of all lobes, and which are to cross the surface."""
