@@ -141,7 +141,7 @@ class Interrupted(_WithImage, KeyboardInterrupt):
         """
         if self.image is not None and not self._displayed:
             self._displayed = True
-            with suppress(Exception):  # what it shows is beside what it says
+            with suppress(Exception):  # a message without its picture still informs
                 from IPython.display import display  # IPython is installed: it called this method
 
                 display(self.image)
@@ -167,7 +167,7 @@ def warn_caller(message: str) -> None:
 
 @contextmanager
 def hear_warnings(listener: Callable[[str], None]) -> Iterator[None]:
-    """Give a function what `warn_caller` is given in this thread, in place of warnings."""
+    """Give a function the messages of `warn_caller` in this thread, in place of warnings."""
     token = _listener.set(listener)
     try:
         yield
@@ -177,14 +177,14 @@ def hear_warnings(listener: Callable[[str], None]) -> Iterator[None]:
 
 @contextmanager
 def collect_warnings() -> Iterator[dict[str, None]]:
-    """Collect what `warn_caller` is given in this thread, each message once, in place of warnings."""
+    """Collect the messages of `warn_caller` in this thread, each once, in place of warnings."""
     messages: dict[str, None] = {}
     with hear_warnings(lambda message: messages.update({message: None})):
         yield messages
 
 
 def in_brief(value: Any) -> str:
-    """Return what a message says of a wrong value: its repr on one line, cut off where it is long."""
+    """Return a wrong value for a message: its repr on one line, cut off where it is long."""
     if isinstance(value, np.ndarray) and value.ndim:
         return f"an array of shape {value.shape}"
     text = " ".join(repr(value).split())
@@ -304,7 +304,7 @@ def mapping(name: str, value: Any) -> dict[Any, Any]:
 
 
 def shape_of(value: Any) -> tuple[int, ...]:
-    """Return the shape of what is to be an array; () of what NumPy makes none of."""
+    """Return the shape of an array, or of a value that NumPy converts to one; () where it cannot."""
     try:
         return np.shape(value)
     except Exception:  # of rows of several lengths, or whatever an object raises; its check says more

@@ -105,9 +105,9 @@ def extension_of(
         Or the subclass `error`, if there is none; the message names those that are known.
     """
     name = path_name(path, error)
-    found = Path(name).suffix.lower()
-    if found:
-        return found
+    extension = Path(name).suffix.lower()
+    if extension:
+        return extension
     if os.path.isdir(name):
         raise error(f"{name}: is a folder, not a file")
     raise error(f"{name or repr(name)}: has no extension; it must be one of {', '.join(known)}")

@@ -1,10 +1,10 @@
 """Fingerprints: whether two objects, perhaps in two processes, compute the same.
 
-A fingerprint is a hash of what an object is made of: numbers, text, arrays by their bytes, other objects by
+A fingerprint is a hash of the contents of an object: numbers, text, arrays by their bytes, other objects by
 the values that pickle would store, nothing of which is run or written. Functions and classes of this package
-and of installed ones are known by their names. Those of a user's own program are known by what they compute:
-their bytecode, defaults, and the variables outside of them that they read; a module of the user's
-that they read is known by its file.
+and of installed ones are known by their names. Those of a user's own program are known by their
+bytecode, defaults, and the variables outside of them that they read; a module of the user's that they read
+is known by its file.
 """
 
 from __future__ import annotations
@@ -91,11 +91,11 @@ class _Fingerprints:
             array = np.asarray(thing)
             return _hash(f"array {array.dtype.str} {array.shape}", np.ascontiguousarray(array).data)
         if type(thing) in (tuple, list):
-            return self._all(type(thing).__name__, ((each, f"{place}[{i}]") for i, each in enumerate(thing)))
+            return self._all(type(thing).__name__, ((item, f"{place}[{i}]") for i, item in enumerate(thing)))
         if type(thing) in (dict, types.MappingProxyType):
             return self._mapping(thing, place)
         if type(thing) in (set, frozenset):
-            return _hash("set", b"".join(sorted(self.of(each, place) for each in thing)))
+            return _hash("set", b"".join(sorted(self.of(child, place) for child in thing)))
         if isinstance(thing, types.ModuleType):
             return self._module(thing, place)
         if isinstance(thing, type):
@@ -119,7 +119,7 @@ class _Fingerprints:
         if isinstance(thing, types.MemberDescriptorType):
             return _hash("slot", thing.__name__.encode())
         if isinstance(thing, property):
-            return self._all("property", [(part, place) for part in (thing.fget, thing.fset)])
+            return self._all("property", [(accessor, place) for accessor in (thing.fget, thing.fset)])
         if isinstance(thing, staticmethod | classmethod):
             return self._all(type(thing).__name__, [(thing.__func__, place)])
         if isinstance(thing, cached_property):
@@ -129,7 +129,7 @@ class _Fingerprints:
         return self._object(thing, place)
 
     def _object(self, thing: Any, place: str) -> bytes:
-        """Return the fingerprint of an object by what pickle would store of it."""
+        """Return the fingerprint of an object by the parts that pickle would store."""
         try:
             parts = thing.__reduce_ex__(4)
         except Exception as error:
@@ -144,7 +144,7 @@ class _Fingerprints:
             "object",
             [
                 (make, place),
-                *((each, place) for each in arguments),
+                *((argument, place) for argument in arguments),
                 (_without_caches(type(thing), state), place),
                 (None if items is None else list(items), place),
                 (None if pairs is None else list(pairs), place),
@@ -154,8 +154,8 @@ class _Fingerprints:
     def _mapping(self, mapping: Mapping[Any, Any], place: str) -> bytes:
         pairs = []
         for key, value in mapping.items():
-            part = f"{place}.{key}" if isinstance(key, str) else f"{place}[{key!r}]"
-            pairs.append(self.of(key, place) + self.of(value, part))
+            value_place = f"{place}.{key}" if isinstance(key, str) else f"{place}[{key!r}]"
+            pairs.append(self.of(key, place) + self.of(value, value_place))
         return _hash("dict", b"".join(sorted(pairs)))
 
     def _module(self, module: types.ModuleType, place: str) -> bytes:
@@ -172,9 +172,9 @@ class _Fingerprints:
         library = _library(cls.__module__)
         if library:
             return _hash("class", f"{library} {cls.__module__} {cls.__qualname__}".encode())
-        own = {name: value for name, value in vars(cls).items() if name not in NOT_COMPARED}
+        attributes = {name: value for name, value in vars(cls).items() if name not in NOT_COMPARED}
         return self._all(
-            f"class {cls.__qualname__}", [(cls.__bases__, place), (own, f"{place}.{cls.__qualname__}")]
+            f"class {cls.__qualname__}", [(cls.__bases__, place), (attributes, f"{place}.{cls.__qualname__}")]
         )
 
     def _function(self, function: types.FunctionType, place: str) -> bytes:
@@ -203,10 +203,10 @@ class _Fingerprints:
     def _code(self, code: types.CodeType, place: str) -> bytes:
         names = (code.co_names, code.co_varnames, code.co_freevars, code.co_cellvars)
         counts = (code.co_argcount, code.co_posonlyargcount, code.co_kwonlyargcount, code.co_flags)
-        return self._all("code", [(each, place) for each in (code.co_code, code.co_consts, names, counts)])
+        return self._all("code", [(child, place) for child in (code.co_code, code.co_consts, names, counts)])
 
     def _all(self, kind: str, parts: Iterable[tuple[Any, str]]) -> bytes:
-        return _hash(kind, b"".join(self.of(part, place) for part, place in parts))
+        return _hash(kind, b"".join(self.of(thing, place) for thing, place in parts))
 
 
 def _hash(kind: str, data: Any) -> bytes:
@@ -216,16 +216,16 @@ def _hash(kind: str, data: Any) -> bytes:
 
 
 def _library(module: str | None) -> str:
-    """Return what is installed that a module belongs to, and its version; "" for a user's own module."""
+    """Return the installed package of a module, and its version; "" for a user's own module."""
     top = (module or "").partition(".")[0]
     if top == "__main__":
         return ""
     if top in sys.stdlib_module_names or top in ("wavefront", "numpy"):
         return top  # their versions are compared elsewhere, where a difference is no more than a warning
-    found = sys.modules.get(top)
-    if not any(folder in (getattr(found, "__file__", None) or "") for folder in INSTALLED):
+    package = sys.modules.get(top)
+    if not any(folder in (getattr(package, "__file__", None) or "") for folder in INSTALLED):
         return ""
-    return f"{top} {getattr(found, '__version__', '')}"
+    return f"{top} {getattr(package, '__version__', '')}"
 
 
 def _globals_read(code: types.CodeType) -> Iterator[str]:

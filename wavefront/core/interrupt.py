@@ -23,7 +23,7 @@ SIGNALS = [signal.Signals[name] for name in NAMES if name in signal.Signals.__me
 
 
 def end_with_parent() -> None:
-    """Do what Ctrl-C does in a process of multiprocessing whose parent has ended: nobody takes its results.
+    """Interrupt this process of multiprocessing once its parent has ended: nobody takes its results.
 
     The sentinel tells that, which a process has only if multiprocessing started it. The id of the parent also
     changes where a terminal is closed and a script goes on. A process that catches the exception, as those of
@@ -78,9 +78,9 @@ class InterruptHandler:
             self._depth += 1
         elif in_main_thread:
             default = signal.default_int_handler
-            self._signals = [each for each in SIGNALS if signal.getsignal(each) is default]
-            for each in self._signals:
-                signal.signal(each, self._handle)
+            self._signals = [signum for signum in SIGNALS if signal.getsignal(signum) is default]
+            for signum in self._signals:
+                signal.signal(signum, self._handle)
             self._depth = min(1, len(self._signals))
         return self
 
@@ -91,8 +91,8 @@ class InterruptHandler:
         self._depth -= 1
         if self._depth:
             return
-        for each in self._signals:
-            signal.signal(each, signal.default_int_handler)
+        for signum in self._signals:
+            signal.signal(signum, signal.default_int_handler)
         answered, self._answered = self._answered or kind is not None, True
         if not answered:
             raise KeyboardInterrupt
@@ -110,9 +110,9 @@ def deferred_signals(also_the_second: bool = False) -> Iterator[None]:
     """Have the program's handlers of signals wait until the block is over.
 
     A handler that raises may do so anywhere in the main thread, whichever thread of the system took the
-    signal: a mask of the main thread alone keeps nothing away. What must be whole, such as the start of
-    processes, which nobody could end whose id was lost, belongs in such a block. A second signal of a kind
-    does not wait unless it is asked for, as what is done may hang.
+    signal: a mask of the main thread alone keeps nothing away. Steps that must not be cut in two belong in
+    such a block, such as the start of processes: nobody could end one whose id was lost. A second signal of a
+    kind does not wait unless it is asked for, as the code may hang.
     """
     waiting: list[int] = []
     before = _handlers(_may_raise)
@@ -167,11 +167,11 @@ def endings_as_ctrl_c() -> Iterator[list[int]]:
 
     def handle(number: int, frame: FrameType | None) -> None:
         came.append(number)
-        for each in before:
-            if each != signal.SIGTERM:
-                signal.signal(each, signal.SIG_IGN)
-            elif each == number:
-                signal.signal(each, signal.SIG_DFL)
+        for signum in before:
+            if signum != signal.SIGTERM:
+                signal.signal(signum, signal.SIG_IGN)
+            elif signum == number:
+                signal.signal(signum, signal.SIG_DFL)
         signal.raise_signal(signal.SIGINT)
 
     handler: Callable[[int, FrameType | None], Any] = handle

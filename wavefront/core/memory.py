@@ -85,7 +85,7 @@ def check_memory(what: str, needed: int) -> None:
     Raises
     ------
     SceneError
-        If they are not. The message says what they are for.
+        If they are not. The message says their use.
     """
     available = available_memory()
     if needed > available:

@@ -54,9 +54,9 @@ def npz_chunks(arrays: Mapping[str, NDArray[Any]]) -> Iterator[Any]:
             with archive.open(zipfile.ZipInfo(f"{name}.npy"), "w", force_zip64=True) as member:
                 np.lib.format.write_array_header_1_0(member, np.lib.format.header_data_from_array_1_0(array))
                 member.write(_bytes_of(array))
-            for part in parts:
-                crc = crc32(part, crc)
-                yield part
+            for chunk in parts:
+                crc = crc32(chunk, crc)
+                yield chunk
             parts.clear()
     directory = b"".join(parts)[:-CHECKSUM]
     yield directory
@@ -88,7 +88,7 @@ def open_npz(file: BufferedReader) -> ZipFile:
     except (ValueError, NotImplementedError, zipfile.BadZipFile) as error:
         raise SceneError(DAMAGED) from error
     members = archive.infolist()
-    if any(each.compress_type for each in members) or sum(each.compress_size for each in members) > size:
+    if any(info.compress_type for info in members) or sum(info.compress_size for info in members) > size:
         raise SceneError(DAMAGED)
     return archive
 

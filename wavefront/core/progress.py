@@ -94,7 +94,7 @@ class Bar:
 
 
 class _Screen:
-    """The standard error, where there is one: what it cannot show is lost, and nothing else.
+    """The standard error, where there is one: text that it cannot show is lost, and nothing else.
 
     It is None in programs without a console, and may be closed, full, or a pipe that nobody reads.
     """
@@ -112,7 +112,7 @@ class _Screen:
             self._file.write(text)
 
     def flush(self) -> None:
-        """Show what was written if that is possible."""
+        """Show the written text if that is possible."""
         with suppress(Exception):
             self._file.flush()
 

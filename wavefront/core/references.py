@@ -81,7 +81,7 @@ def elsewhere(
     Parameters
     ----------
     source, reference, places, roots
-        As of `followed`, whose rules hold for what is found.
+        As of `followed`, whose rules hold for the file.
     listed
         The folders that were looked through before; those that are now are added.
 
@@ -93,10 +93,10 @@ def elsewhere(
     for exact in (True, False):
         for name in _names(reference):
             for place in places:
-                there = name if exact else _in_any_case(place, name, roots, listed)
-                if there is not None and os.path.isfile(place / there):
+                file_name = name if exact else _in_any_case(place, name, roots, listed)
+                if file_name is not None and os.path.isfile(place / file_name):
                     with suppress(SceneError):
-                        return followed(source, there, [place], roots)[0]
+                        return followed(source, file_name, [place], roots)[0]
     return None
 
 
@@ -107,24 +107,24 @@ def _names(reference: str) -> Iterator[str]:
         path = re.split("[?#]", path)[0]
     for text in dict.fromkeys((path, unquote(path))):
         bare = re.sub("^[A-Za-z][A-Za-z0-9+.-]*:", "", text)  # a scheme or a drive
-        parts = [part for part in bare.split("/") if part not in ("", ".", "..")]
-        for start in range(max(0, len(parts) - MOST_PARTS), len(parts)):
-            yield "/".join(parts[start:])
+        segments = [segment for segment in bare.split("/") if segment not in ("", ".", "..")]
+        for start in range(max(0, len(segments) - MOST_PARTS), len(segments)):
+            yield "/".join(segments[start:])
 
 
 def _in_any_case(folder: Path, name: str, roots: Sequence[Path], listed: Listed) -> str | None:
     """Return a name as files in a folder have it, whose case may differ."""
-    found, here = [], folder
-    for part in name.split("/"):
+    matched, here = [], folder
+    for segment in name.split("/"):
         if here not in listed:
             inside = any(here.resolve().is_relative_to(root) for root in roots)
-            listed[here] = {each.casefold(): each for each in _names_in(here)} if inside else {}
-        alike = listed[here].get(part.casefold())
+            listed[here] = {file.casefold(): file for file in _names_in(here)} if inside else {}
+        alike = listed[here].get(segment.casefold())
         if alike is None:
             return None
-        found.append(alike)
+        matched.append(alike)
         here = here / alike
-    return "/".join(found)
+    return "/".join(matched)
 
 
 def _names_in(folder: Path) -> list[str]:

@@ -101,7 +101,7 @@ class Registry(Mapping[str, T], Generic[T]):
         return self[one_of(setting or self.setting, value, [*self._entries, *self._plugged])]
 
     def label(self, value: Any) -> str:
-        """Return the name of what `find` takes: its name in the table, else that of the function or class.
+        """Return the name of an argument of `find`: that in the table, else that of the function or class.
 
         Of a dataclass it is the call that makes it, with its parameters.
         """

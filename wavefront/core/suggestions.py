@@ -42,13 +42,13 @@ def did_you_mean(name: object, known: Iterable[str], places: Iterable[str] = ())
         return ""
     plain = {_plain(other): other for other in known}
     word = _plain(name)
-    found = plain.get(word)
-    if found is None:
+    similar = plain.get(word)
+    if similar is None:
         answer = synonym_of(word, plain, places)
         if answer:
             return answer
-        found = _misspelled(word, plain)
-    return "" if found is None else f"; did you mean {found!r}?"
+        similar = _misspelled(word, plain)
+    return "" if similar is None else f"; did you mean {similar!r}?"
 
 
 def synonym_of(word: str, plain: dict[str, str], places: Iterable[str]) -> str:
@@ -68,7 +68,7 @@ def _misspelled(word: str, plain: dict[str, str]) -> str | None:
 
 
 def _is_name(answer: str) -> bool:
-    """Return whether an answer is a name, also one of two words, and not what to write."""
+    """Return whether an answer is a name, also one of two words, and not text to write."""
     return answer.replace(" ", "_").isidentifier()
 
 
@@ -98,12 +98,12 @@ class Answers(metaclass=Answering):
 
 
 def _instead(cls: type, name: str) -> str:
-    """Return what there is in place of an attribute: only by the table, as programs ask often."""
+    """Return a hint for a missing attribute: only by the table, as programs ask often."""
     if name.startswith("_"):
         return ""
     word = _plain(name)
-    for each in cls.__mro__:
-        for answer in SYNONYMS.get(f"{each.__name__.lower()}.{word}", ()):
+    for base in cls.__mro__:
+        for answer in SYNONYMS.get(f"{base.__name__.lower()}.{word}", ()):
             return f"; did you mean {answer!r}?" if _is_name(answer) else f"; write {answer}"
     return ""
 
@@ -151,9 +151,9 @@ def _places(function: Callable[..., object], args: Sequence[object]) -> Iterator
         yield name
         return
     owner = args[0] if isinstance(args[0], type) else type(args[0])
-    for each in owner.__mro__:
-        yield f"{each.__name__}()" if name.endswith("__init__") else f"{each.__name__}.{function.__name__}"
-        yield each.__name__
+    for base in owner.__mro__:
+        yield f"{base.__name__}()" if name.endswith("__init__") else f"{base.__name__}.{function.__name__}"
+        yield base.__name__
 
 
 def _plain(name: str) -> str:

@@ -1,8 +1,8 @@
-"""Names that people look for, and what there is in their place.
+"""Names that people look for, and the names in their place.
 
 A key is a name in lower case without underscores. One with a dot counts only in its place: a class (its
 subclasses count, too), a class with "()" for its constructor, a function, or "wavefront" for the package. An
-answer is a name, which counts where it is known, or else what to write. The first that counts is given.
+answer is a name, which counts where it is known, or else text to write. The first that counts is given.
 """
 
 from __future__ import annotations

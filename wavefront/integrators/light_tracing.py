@@ -2,7 +2,7 @@
 
 A path from the camera meets a small light behind glass or in a mirror by chance only, and a point light
 never. So paths are traced from the lights, too, where they are asked for. Each begins at a point on a
-specular surface (compile/specular_surfaces.py). Light samples find what arrives there, and BSDF samples
+specular surface (compile/specular_surfaces.py). Light samples estimate the light there, and BSDF samples
 carry it on. At each surface on its way that does not scatter by delta lobes alone, the path is connected to
 the camera, and adds to whatever pixel sees that surface.
 
@@ -78,11 +78,11 @@ def trace_light(
     if max_bounces < 2 or scene.lights.choice is None:
         return _nothing()
     paths, hits, flux = _begin(scene, scene.specular_surfaces, camera, sampler, pixel, sample)
-    found = []
+    splats = []
     for bounce in range(max_bounces - 1):
         shade = _prepared(scene, paths, hits)
         if bounce:
-            found.append(_connect(scene, camera, sampler, paths, hits, shade, flux, bounce))
+            splats.append(_connect(scene, camera, sampler, paths, hits, shade, flux, bounce))
         paths = _scatter(scene, paths, hits, shade, sampler, bounce)
         lanes = roulette(scene, paths, sampler, bounce)
         paths = select(paths, lanes)
@@ -97,8 +97,8 @@ def trace_light(
             break
     else:
         shade = _prepared(scene, paths, hits)
-        found.append(_connect(scene, camera, sampler, paths, hits, shade, flux, max_bounces - 1))
-    return Splats.concatenate([_nothing(), *found])
+        splats.append(_connect(scene, camera, sampler, paths, hits, shade, flux, max_bounces - 1))
+    return Splats.concatenate([_nothing(), *splats])
 
 
 def _nothing() -> Splats:
@@ -206,8 +206,8 @@ def _first(scene: CompiledScene, specular: SpecularSurfaces, rays: ShadowRays) -
     """
     away, nothing = NEARBY * rays.error, broadcast(np.intp(-1), len(rays))
     back = Rays(rays.origin + rays.direction * away, -rays.direction, nothing, time=rays.time)
-    found = scene.accelerator.closest(*query(scene, back))
-    return ~((found.t < 2 * away) & (found.prim < specular.found_as.take(rays.exclude_prim)))
+    hits = scene.accelerator.closest(*query(scene, back))
+    return ~((hits.t < 2 * away) & (hits.prim < specular.found_as.take(rays.exclude_prim)))
 
 
 def _transmittance(scene: CompiledScene, rays: ShadowRays, veils: Veils = ()) -> Floats:
@@ -263,7 +263,7 @@ def _scatter(
 
 
 def _ratio_of_cosines(shade: Shading, left: Paths) -> Floats:
-    """Return what shading normals change for light that comes along, (n,) (Veach 1997, eq. 5.19)."""
+    """Return the factor (n,) of shading normals for light along paths from lights (Veach 1997, eq. 5.19)."""
     surface = shade.surface
     before, after = (
         _divided(np.abs(dot(a, direction)), np.abs(dot(b, direction)))
@@ -304,7 +304,7 @@ def _towards(
 ) -> Floats:
     """Return f times two cosines (3, k), given light that comes from wi (3, k) and leaves along wo (3, k).
 
-    `stack` (4, k) has what is around where it leaves, at times (k,). The cosines are that of wo with the
+    `stack` (4, k) has the media around where it leaves, at times (k,). The cosines are that of wo with the
     geometric normal, and that of wi with the shading normal over that with the geometric one, as the flux
     that arrives has the latter.
     """
@@ -326,7 +326,7 @@ def _connect(
     flux: Floats,
     bounce: int,
 ) -> Splats:
-    """Return what the camera sees of the light that paths bring to surfaces."""
+    """Return the splats of the light that paths bring to surfaces."""
     surface = shade.lit().surface  # the first lanes: those after them have only delta lobes
     n = len(surface)
     address = paths.pixel[:n], paths.sample[:n], bounce
@@ -364,7 +364,7 @@ def _connect(
 def _connections(
     scene: CompiledScene, camera: Camera, point: Floats, time: Doubles | None, lens: Floats | None
 ) -> tuple[Floats, Doubles, Doubles]:
-    """Return what `Camera.connections` does for points (3, n) at times (n,)."""
+    """Return `Camera.connections` for points (3, n) at times (n,)."""
     exposure = scene.program.find(Exposure)
     if exposure is None or time is None:
         return camera.connections(point, scene.center, lens)
@@ -385,5 +385,5 @@ def _seen(scene: CompiledScene, camera: Camera, film: Doubles, rays: Rays, hits:
 def _pixels(camera: Camera, film: Doubles) -> Words:
     """Return the row-major indices (k,) within the window of the pixels that film points (2, k) are in."""
     x0, y0, x1, _ = camera.window
-    column, row = (np.floor(each).astype(np.int64) for each in film)
+    column, row = (np.floor(coordinate).astype(np.int64) for coordinate in film)
     return ((row - y0) * (x1 - x0) + (column - x0)).astype(np.uint32)

@@ -60,7 +60,7 @@ class Sharing:
     max_bounces: int
 
     def share(self, L: Floats, first: Paths, shade: Shading, paths: Paths, tiles: WaveTiles) -> None:
-        """Add to L, (3, n) of all slots, what first surfaces get from all but light samples.
+        """Add to L, (3, n) of all slots, the light of first surfaces from all but light samples.
 
         Parameters
         ----------
@@ -75,8 +75,8 @@ class Sharing:
             return
         lanes, points, matte = shared_points(self.scene, paths, hits, self.scene.program.branches)
         g = lanes.size - matte
-        own = np.setdiff1d(np.arange(len(paths)), lanes, assume_unique=True)
-        self._follow([(paths.take(own), hits.take(own))], 1, L)
+        unshared = np.setdiff1d(np.arange(len(paths)), lanes, assume_unique=True)
+        self._follow([(paths.take(unshared), hits.take(unshared))], 1, L)
         light = np.zeros((3, matte + SECTIONS * g), f4)
         begun, hits = as_shared(paths.take(lanes), light.shape[1]), hits.take(lanes)
         ways = [(way, hits.take(slice(0, matte))) for way in copies(begun.take(slice(0, matte)), SHARED_WAYS)]
@@ -87,29 +87,29 @@ class Sharing:
             ways += more
         self._follow(ways, 2, light)
         sums = [(L, light), *first.recorder.parts_of_shared()]
-        for to, found in sums:
-            found[:, :matte] *= f4(1 / SHARED_WAYS)
-            add_to_slots(to, points.slot[some], points.throughput[:, some] * found[:, lanes.size :][:, :g])
+        for to, shared in sums:
+            shared[:, :matte] *= f4(1 / SHARED_WAYS)
+            add_to_slots(to, points.slot[some], points.throughput[:, some] * shared[:, lanes.size :][:, :g])
         add_shared(self.scene, sums, first, shade, points, tiles, self.scene.program.branches, glossy)
 
     def _glossy(self, paths: Paths, hits: Hits, light: Floats) -> tuple[GlossyPoints, Ways]:
         """Follow paths from g glossy points to their next surfaces, and return both.
 
-        What arrives there is added to the first and the last section of `light`, and what stays the path's
-        own, by delta lobes or by emission, to that between them.
+        The light that arrives there is added to the first and the last section of `light`, and that which
+        pixels do not share, by delta lobes or by emission, to that between them.
         """
         g = len(paths)
         shade = prepare_shading(self.scene, paths, hits)
         left = bounce_sample(paths, shade, self.sampler, 1)
-        glossy, found = GlossyPoints.of(self.scene, paths, shade, self.sampler, left.direction)
-        accumulate(light, paths, found)
+        glossy, contribution = GlossyPoints.of(self.scene, paths, shade, self.sampler, left.direction)
+        accumulate(light, paths, contribution)
         left = replace(left, slot=left.slot + g)
         left, hits = self._onward(select(left, np.flatnonzero(alive(left))), 1, light)
-        own, shared = np.flatnonzero(left.specular), np.flatnonzero(~left.specular)
+        specular, shared = np.flatnonzero(left.specular), np.flatnonzero(~left.specular)
         begun = left.take(shared)
         begun.slot, begun.roulette_scale = begun.slot + g, begun.roulette_scale * highest(begun.throughput)
         begun.throughput = np.ones_like(begun.throughput)
-        return glossy, [(left.take(own), hits.take(own)), (begun, hits.take(shared))]
+        return glossy, [(left.take(specular), hits.take(specular)), (begun, hits.take(shared))]
 
     def _follow(self, ways: Ways, bounce: int, L: Floats) -> None:
         """Follow paths from surfaces on that are not shaded yet, and add the light that they find to L."""

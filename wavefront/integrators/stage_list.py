@@ -40,7 +40,7 @@ class ListedStage:
 
     name: str
     file: str  # within the package, or the module of a user
-    sentence: str  # what it does
+    sentence: str  # its summary
     point: str = ""  # of a feature
     camera_only: bool = False
 
@@ -59,10 +59,10 @@ class StageList:
     def __str__(self) -> str:
         """Return a line for each, those of features indented."""
         rows = [("", f"integrator {self.integrator}", "")]
-        for each in self.stages:
-            only = " (Camera rays only.)" if each.camera_only else ""
-            name = f"  + {each.name}.{each.point}" if each.point else each.name
-            rows.append((name, each.sentence + only, each.file))
+        for stage in self.stages:
+            only = " (Camera rays only.)" if stage.camera_only else ""
+            name = f"  + {stage.name}.{stage.point}" if stage.point else stage.name
+            rows.append((name, stage.sentence + only, stage.file))
         wide, long = max(len(row[0]) for row in rows), max(len(row[2]) for row in rows)
         return "\n".join(f"{name:{wide}}  {file:{long}}  {text}".rstrip() for name, text, file in rows[1:])
 
@@ -84,7 +84,7 @@ def list_stages(integrator: Callable[..., Any], program: Program, mis: bool = Tr
     for stage, points in ORDER:
         if stage in used and (mis or stage is not mis_weighted):
             rows.append(ListedStage(stage.__name__, _file(stage), _sentence(stage)))
-            rows += [_row(each, point) for point in points for each in _acting(program.features, point)]
+            rows += [_row(feature, point) for point in points for feature in _acting(program.features, point)]
     return StageList(getattr(integrator, "__name__", repr(integrator)), tuple(rows))
 
 
@@ -96,8 +96,8 @@ def _row(feature: Feature, point: str) -> ListedStage:
 def _acting(features: Sequence[Feature], point: str) -> list[Feature]:
     """Return the features that act at a point, or that have an attribute of its name."""
     if callable(getattr(Feature, point)):
-        return [each for each in features if acts(each, point)]
-    return [each for each in features if getattr(each, point) != getattr(Feature, point)]
+        return [feature for feature in features if acts(feature, point)]
+    return [feature for feature in features if getattr(feature, point) != getattr(Feature, point)]
 
 
 def _called(function: Any, seen: set[Any]) -> set[Any]:

@@ -65,8 +65,8 @@ def prepare_shading(scene: CompiledScene, paths: Paths, hits: Hits) -> Shading:
 def note(paths: Paths, name: str, values: Floats) -> None:
     """Note numbers about paths for the AOV "noted.NAME" of a picture, in an integrator of one's own.
 
-    They are added to the samples of the paths, whose mean each pixel shows; what becomes of a path in several
-    branches counts by their mean. Where that AOV is not asked for, nothing is done. Where it is, `note` must
+    They are added to the samples of the paths, whose mean each pixel shows; the branches of a path count by
+    their mean. Where that AOV is not asked for, nothing is done. Where it is, `note` must
     be called in each wave, if only with the paths of the camera.
 
     Parameters
@@ -102,9 +102,9 @@ def scatter(
 ) -> Paths:
     """Add direct light to L, and return the paths that go on in new directions, in one or several ways."""
     shade, ways = prepare_shading(scene, paths, hits), scene.program.ways(bounce)
-    for each in copies(paths, ways):
-        found = direct(scene, each, shade, sampler, bounce, mis=True)
-        found.radiance *= f4(1 / ways)
-        accumulate(L, each, found)
+    for way in copies(paths, ways):
+        contribution = direct(scene, way, shade, sampler, bounce, mis=True)
+        contribution.radiance *= f4(1 / ways)
+        accumulate(L, way, contribution)
     paths = branch(paths, shade, sampler, bounce, ways)
     return select(paths, roulette(scene, paths, sampler, bounce))

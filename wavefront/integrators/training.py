@@ -43,7 +43,7 @@ class Vertices(SoA):
     pdf_bsdf: Floats  # (k,) that of the BSDF alone
     before: Floats  # (k,) sum of the channels of the throughput before
     after: Floats  # (k,) and after
-    found: Floats  # (k,) sum of the channels of the radiance that was found before this vertex
+    radiance_before: Floats  # (k,) sum of the channels of the radiance before this vertex
 
 
 def train(scene: CompiledScene, camera: Camera, sampler: Sampler, max_bounces: int) -> GuideTable | None:
@@ -60,15 +60,15 @@ def train(scene: CompiledScene, camera: Camera, sampler: Sampler, max_bounces: i
     table: GuideTable | None = None
     cells: GuideCells | None = None
     done = 0
-    for part in ROUNDS:
-        count = int(PATHS * part)
-        found = [
+    for fraction in ROUNDS:
+        count = int(PATHS * fraction)
+        traced = [
             _trace(scene, camera, sampler, max_bounces, table, first, min(WAVE, done + count - first))
             for first in range(done, done + count, WAVE)
         ]
         done += count
-        vertices = Vertices.concatenate([each for each, _ in found])
-        light = np.concatenate([each for _, each in found])
+        vertices = Vertices.concatenate([wave for wave, _ in traced])
+        light = np.concatenate([light_of_wave for _, light_of_wave in traced])
         if not len(vertices):
             return table
         cells = cells or GuideCells.around(vertices.point, LEVELS)
@@ -88,14 +88,14 @@ def _trace(
     first: int,
     count: int,
 ) -> tuple[Vertices, Floats]:
-    """Trace a wave; return its vertices, and what each of their paths found afterwards, (k,)."""
+    """Trace a wave; return its vertices, and the light that their paths find afterwards, (k,)."""
     pixel, sample = _addresses(camera, first, count)
     scene = seen_with(scene, table)
     paths = generate(scene, camera, sampler, pixel, sample)
     recorder = paths.recorder = VertexRecorder()
     L = li_full(scene, paths, sampler, max_bounces + camera.scatterings)
     joined = Vertices.concatenate(recorder.vertices) if recorder.vertices else _none()
-    light = L.sum(0).take(joined.slot) - joined.found
+    light = L.sum(0).take(joined.slot) - joined.radiance_before
     good = np.flatnonzero((joined.pdf > 0) & (joined.after > 0) & np.isfinite(light))
     return joined.take(good), light.take(good).clip(0, np.inf)
 
@@ -137,7 +137,7 @@ def _vertices(L: Floats, paths: Paths, left: Paths, shade: Shading) -> Vertices:
         pdf_bsdf=pdf_bsdf.take(lanes),
         before=take(paths.throughput, lanes).sum(0),
         after=take(left.throughput, lanes).sum(0),
-        found=take(L, slot).sum(0),
+        radiance_before=take(L, slot).sum(0),
     )
 
 

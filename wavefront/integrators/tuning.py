@@ -3,10 +3,10 @@
 Its random numbers are not those of the picture. Errors come from blocks of samples, and costs from rays that
 are counted, not timed: they depend on the scene, the camera and the settings alone.
 
-One run tells what any number of branches costs. From its first surface on, each path goes on twice, with
-other random numbers. What both twins have in common is the noise of what comes before, which branches share;
-n branches have the n-th part of the rest. It also tells what sharing paths (stages/reuse.py) would not touch:
-the light that paths find before they are shaded at their second points.
+One run tells the cost of any number of branches. From its first surface on, each path goes on twice, with
+other random numbers. The covariance of both twins is the variance of the path before, which branches
+share; n branches have the n-th part of the rest. It also tells the variance that sharing paths
+(stages/reuse.py) would not reduce: that of the light before paths are shaded at their second points.
 
 Sources: E. Veach, thesis 1997, §10.4.2 (efficiency); M. Pharr and G. Humphreys, "Physically Based Rendering",
 1st ed. 2004, §15.1 (splitting).
@@ -57,7 +57,7 @@ class Run:
     variance: Doubles  # (pixels,) of blocks of samples
     common: Doubles  # (pixels,) the part of it that branches share
     own: Doubles  # (pixels,) variance of the light that pixels cannot share
-    first: float  # rays up to the first surfaces, weighted by what they cost
+    first: float  # rays up to the first surfaces, weighted by their cost
     onward: float  # those from there on, of one twin
     met: Ints  # (materials,) how many second points of paths are of each material
     narrow: int  # how many paths leave these in narrow lobes
@@ -74,7 +74,7 @@ class Run:
 
     def mean_variance(self, branches: int = 1) -> float:
         """Return the mean variance of the pixels that count."""
-        of_one, common = (_mean(part[self.kept()]) for part in (self.variance, self.common))
+        of_one, common = (_mean(variances[self.kept()]) for variances in (self.variance, self.common))
         common = min(max(common, 0.0), of_one)
         return common + (of_one - common) / branches
 
@@ -136,9 +136,9 @@ def tuning_run(
     second = paths.recorder = SecondPoints(scene.materials.group_of.size)
     bounces = min(max_bounces, BOUNCES) + camera.scatterings
     L = li_twins(scene, paths, sampler, bounces)
-    every, own = (_blocks(each, block, pixel.size) for each in (L, L if second.own is None else second.own))
+    every, own = (_blocks(light, block, pixel.size) for light in (L, L if second.own is None else second.own))
     scale = _scale(every.mean((0, 2)), pixels) if like is None else like.scale
-    deviation, of_own = (_deviation(each) for each in (every, own))
+    deviation, of_own = (_deviation(blocks) for blocks in (every, own))
     weight = 1 if table is None else GUIDED_RAY
     first = weight * float(n) if camera.sensor is None else 0.0  # paths from sensors begin at one
     return Run(
@@ -193,16 +193,16 @@ def li_twins(scene: CompiledScene, paths: Paths, sampler: Sampler, max_bounces: 
             L[:, n:] = L[:, :n]
         if bounce == max_bounces or not len(paths):
             break
-        each = [paths]
+        twins = [paths]
         if bounce == 0:
             other, through = paths.sample + samples, paths.throughput.copy()
-            each.append(replace(paths, slot=paths.slot + n, sample=other, throughput=through))
-        paths = Paths.concatenate([scatter(scene, L, some, hits, sampler, bounce) for some in each])
+            twins.append(replace(paths, slot=paths.slot + n, sample=other, throughput=through))
+        paths = Paths.concatenate([scatter(scene, L, some, hits, sampler, bounce) for some in twins])
     return L
 
 
 class SecondPoints(PathRecorder):
-    """Tells what is at the second points of paths.
+    """Records the materials and the light at the second points of paths.
 
     Parameters
     ----------

@@ -42,18 +42,18 @@ def moderated_variance(
         Their variances by the scatter of batches, and the degrees of freedom of those.
     """
     weight, seen = np.minimum(SINGLE, FADING / samples), samples / (samples + 1)
-    parts = (
+    components = (
         (weight / (weight + freedom) * seen * alone, samples - 1),
         (freedom / (weight + freedom) * seen * scatter, freedom),
         (np.square(UNSEEN * mean) / (samples * (samples + 1)), samples - 1),
     )
-    variance = np.asarray(sum(part for part, _ in parts))
-    spread = np.asarray(sum(np.square(part) / degrees for part, degrees in parts))
+    variance = np.asarray(sum(component for component, _ in components))
+    spread = np.asarray(sum(np.square(component) / degrees for component, degrees in components))
     return variance, np.where(spread > 0, np.square(variance) / np.where(spread > 0, spread, 1), samples - 1)
 
 
 def event_of(mean: Doubles, variance: Doubles) -> Doubles:
-    """Return what one event brings to means that are sums of like, rare events; 0 where there are none.
+    """Return the contribution of one event to means that are sums of like, rare events; 0 without any.
 
     Of such a sum the variance is as many times the mean. The events at points near each other are as bright
     as each other, but a point may have met none yet.
@@ -102,5 +102,5 @@ def _gamma_quantile(mean: Doubles, variance: Doubles, t: Doubles) -> Doubles:
 
 
 def rule_of_three(confidence: float, samples: Doubles) -> Doubles:
-    """Return the highest chance per sample of what no sample has met, at a confidence: 3/n for 95 %."""
+    """Return the highest chance per sample of an event that no sample met, at a confidence: 3/n for 95 %."""
     return -np.log1p(-confidence) / samples

@@ -17,7 +17,7 @@ from .scatter import Scatter, sums_by_label
 from .student_t import t_quantile
 
 FEW = 8.0  # pixels, or tiles, for which the scatter of batches counts as much as the differences of halves
-LEAST_EXTRAPOLATED = 12  # samples from where on halves of them show what stratification gains
+LEAST_EXTRAPOLATED = 12  # samples from which on halves of them show the gain of stratification
 
 
 @dataclass(frozen=True, slots=True)
@@ -112,15 +112,15 @@ def _by_halves(variance: Doubles, region: Bools, errors: PixelErrors, samples: i
         return variance
     halves = errors.halves[region].astype(np.float64)
     sums = halves if tile is None else sums_of_tiles(halves, tile[region])
-    found = (np.square(sums).sum(0) + FEW / len(sums) * variance) / (1 + FEW / len(sums))
+    estimate = (np.square(sums).sum(0) + FEW / len(sums) * variance) / (1 + FEW / len(sums))
     if errors.alone is None or samples < LEAST_EXTRAPOLATED:
-        return np.asarray(found)
+        return np.asarray(estimate)
     assert errors.standard_error is not None
     batches = np.square(errors.standard_error[region], dtype=np.float64).sum(0)
     few, alone = FEW / len(halves), errors.alone[region].sum(0)
-    part = (np.square(halves).sum(0) + few * batches) / (1 + few)
-    gain = np.minimum(part / np.where(alone > 0, alone, 1), 1)
-    return np.asarray(found * gain ** (_steps_of_gain(samples) / (1 + few)))
+    half_variance = (np.square(halves).sum(0) + few * batches) / (1 + few)
+    gain = np.minimum(half_variance / np.where(alone > 0, alone, 1), 1)
+    return np.asarray(estimate * gain ** (_steps_of_gain(samples) / (1 + few)))
 
 
 def _steps_of_gain(samples: int) -> float:
@@ -136,8 +136,8 @@ def _steps_of_gain(samples: int) -> float:
 
 def _common_tile(scatter: Sequence[Scatter]) -> NDArray[np.int32] | None:
     """Return the tiles (H, W) that share paths, if those of all parts of a picture are the same."""
-    tiles = [each.tile for each in scatter]
-    return tiles[0] if tiles and all((each == tiles[0]).all() for each in tiles) else None
+    tiles = [group.tile for group in scatter]
+    return tiles[0] if tiles and all((tile == tiles[0]).all() for tile in tiles) else None
 
 
 def sums_of_tiles(values: Doubles, tile: NDArray[np.int32]) -> Doubles:

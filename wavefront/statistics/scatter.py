@@ -1,4 +1,4 @@
-"""How batches of samples scatter where pixels share paths: what the error of a mean over pixels is made of.
+"""The scatter of batches of samples where pixels share paths: it gives the error of a mean over pixels.
 
 The errors of the pixels of a tile depend on each other, those of tiles do not (sampling/tiles.py). So the sum
 over the pixels of one tile is formed for each batch of samples, and the scatter of these sums over batches is
@@ -66,8 +66,8 @@ def film_scatter(
     errors = standard_error.reshape(-1, 3)
     for span in chunks(width * height):
         scale = np.maximum(errors[span], np.finfo(np.float32).tiny)
-        found = film.deviations(span).transpose(2, 0, 1)
-        deviations[span] = _whole(found * (UNIT / scale.astype(np.float64))[:, None])
+        raw = film.deviations(span).transpose(2, 0, 1)
+        deviations[span] = _whole(raw * (UNIT / scale.astype(np.float64))[:, None])
     pixel = np.add.outer(
         (np.arange(height, dtype=np.int64) + corner[1]) * whole[0], np.arange(width) + corner[0]
     )
@@ -104,15 +104,15 @@ def sums_by_label(
     some = np.flatnonzero(label.ravel() >= 0)
     where = label.ravel().take(some)
     error = standard_error.reshape(-1, 3)[some].astype(np.float64)
-    variance, spread, own = np.zeros((labels, 3)), np.zeros((labels, 3)), np.ones_like(error)
-    for each in scatter:
-        part = each.deviations.reshape(-1, *each.deviations.shape[2:])[some] / np.float64(UNIT)
-        own -= np.square(part).sum(1)
-        part *= error[:, None]
-        shared, tile = _by_tile(part, each.tile.ravel()[some], where)
+    variance, spread, unshared = np.zeros((labels, 3)), np.zeros((labels, 3)), np.ones_like(error)
+    for group in scatter:
+        deviations = group.deviations.reshape(-1, *group.deviations.shape[2:])[some] / np.float64(UNIT)
+        unshared -= np.square(deviations).sum(1)
+        deviations *= error[:, None]
+        shared, tile = _by_tile(deviations, group.tile.ravel()[some], where)
         _add_to(variance, tile, shared[0])
         _add_to(spread, tile, shared[1])
-    alone = np.square(error) * np.where(own > ROUNDING, own, 0)
+    alone = np.square(error) * np.where(unshared > ROUNDING, unshared, 0)
     _add_to(variance, where, alone)
     _add_to(spread, where, np.square(alone) / freedom.ravel()[some, None])
     return variance, spread
@@ -121,14 +121,14 @@ def sums_by_label(
 ROUNDING = 0.05  # part of a squared error that the rounding of deviations may leave over
 
 
-def _by_tile(part: Doubles, tile: NDArray[np.int32], label: Ints) -> tuple[tuple[Doubles, Doubles], Ints]:
+def _by_tile(pixels: Doubles, tile: NDArray[np.int32], label: Ints) -> tuple[tuple[Doubles, Doubles], Ints]:
     """Return variance and spread (m, 3) of the sums over pixels of one tile and label, and labels (m,).
 
     All pixels of a tile have equally many samples.
 
     Parameters
     ----------
-    part
+    pixels
         (k, batches, 3) deviations of pixels.
     """
     order = np.lexsort((tile, label))
@@ -136,7 +136,7 @@ def _by_tile(part: Doubles, tile: NDArray[np.int32], label: Ints) -> tuple[tuple
     first = np.flatnonzero(np.append(True, (key[:, 1:] != key[:, :-1]).any(0)))
     if not order.size:
         return (np.zeros((0, 3)), np.zeros((0, 3))), np.zeros(0, np.intp)
-    sums = np.add.reduceat(part[order], first, axis=0)
+    sums = np.add.reduceat(pixels[order], first, axis=0)
     variance = np.square(sums).sum(1)
     freedom = np.maximum((sums != 0).any(2).sum(1) - 1, 1)[:, None]
     return (variance, np.square(variance) / freedom), key[0, first]
@@ -162,17 +162,17 @@ def scatter_of_difference(
     """
     tiny = np.finfo(np.float32).tiny
     return tuple(
-        each.rescaled(error / np.maximum(standard_error, tiny))
+        group.rescaled(error / np.maximum(standard_error, tiny))
         for scatter, error in parts
-        for each in scatter
+        for group in scatter
     )
 
 
 def scatter_arrays(scatter: Sequence[Scatter]) -> dict[str, NDArray[Any]]:
     """Return all arrays by the names that they have in files."""
     return {
-        f"{PREFIX}{number}.{name}": getattr(each, name)
-        for number, each in enumerate(scatter)
+        f"{PREFIX}{number}.{name}": getattr(group, name)
+        for number, group in enumerate(scatter)
         for name in NAMES
     }
 
@@ -187,13 +187,13 @@ def restored_scatter(
     SceneError
         If one is missing, or is of another shape or type.
     """
-    found: list[Scatter] = []
+    restored: list[Scatter] = []
     for _ in range(len(arrays) // len(NAMES)):
-        values = {name: arrays.get(f"{PREFIX}{len(found)}.{name}") for name in NAMES}
+        values = {name: arrays.get(f"{PREFIX}{len(restored)}.{name}") for name in NAMES}
         for name, (kind, dimensions) in NAMES.items():
-            each = values[name]
-            right = each is not None and each.dtype == kind and each.ndim == dimensions
-            if each is None or not right or each.shape[:2] != shape[:2] or each.shape[3:] not in ((), (3,)):
+            data = values[name]
+            right = data is not None and data.dtype == kind and data.ndim == dimensions
+            if data is None or not right or data.shape[:2] != shape[:2] or data.shape[3:] not in ((), (3,)):
                 raise SceneError(f"{file}: the scatter of its samples is damaged: {name!r}")
-        found.append(Scatter(**values))  # type: ignore[arg-type]
-    return tuple(found)
+        restored.append(Scatter(**values))  # type: ignore[arg-type]
+    return tuple(restored)

@@ -74,7 +74,7 @@ def _p_of_mean(a: Estimate, b: Estimate, independent: bool = True) -> Doubles:
 
     Pixels are the samples: their differences are independent, and the mean of each is 0 if the pictures are
     the same, so Student's t test needs no errors of pixels. Those are too large for few samples, since they
-    leave out what stratification gains between batches, which are as short as one sample. Where pixels share
+    leave out the gain of stratification between batches, which are as short as one sample. Where pixels share
     paths, tiles are the samples. With about as many samples in both pictures the differences are nearly
     symmetric, and the test is a cautious one however much their variances differ (Y. Benjamini, Is the t Test
     Really Conservative when the Parent Distribution is Long-Tailed?, 1983).
@@ -88,14 +88,14 @@ def _p_of_mean(a: Estimate, b: Estimate, independent: bool = True) -> Doubles:
         return p_values(_averaged(a, side), _averaged(b, side))
     tile = _common_tiles(a, b)
     weight = _quietness(a, b)
-    return np.stack([_p_of_sums(a.mean * each, b.mean * each, tile) for each in (np.ones(1), weight)])
+    return np.stack([_p_of_sums(a.mean * factor, b.mean * factor, tile) for factor in (np.ones(1), weight)])
 
 
 def _p_of_sums(first: Doubles, second: Doubles, tile: NDArray[np.int32] | None) -> Doubles:
     """Return the p-values (3,) of the difference of the sums of pictures (H, W, 3), with tiles as samples."""
     first, second = first.reshape(-1, 3), second.reshape(-1, 3)
     if tile is not None:
-        first, second = (sums_of_tiles(each, tile.ravel()) for each in (first, second))
+        first, second = (sums_of_tiles(picture, tile.ravel()) for picture in (first, second))
     apart, count = first - second, len(first)
     rounding = ROUNDING * np.maximum(np.abs(first.mean(0)), np.abs(second.mean(0)))
     off = np.maximum(np.abs(apart.mean(0)) - rounding, 0)
@@ -115,7 +115,7 @@ def _quietness(a: Estimate, b: Estimate) -> Doubles:
     squared = np.square(mean) + EPSILON * np.square(mean.mean((0, 1)))
     noisy = alone > 0
     logarithm = np.log(np.where(noisy, alone + 2 * squared * np.square(UNSEEN / samples), 1))
-    total, count = (_around(each) for each in (logarithm, noisy.astype(np.float64)))
+    total, count = (_around(image) for image in (logarithm, noisy.astype(np.float64)))
     quiet = np.where(count > 0, np.exp(-total / np.maximum(count, 1)), 0)
     most = quiet.max((0, 1))
     return np.asarray(quiet / np.where(most > 0, most, 1))
@@ -145,10 +145,10 @@ def _are_alike(a: Estimate, b: Estimate) -> bool:
     They cannot if they are few, if it is not known which pixels share paths, or if one of the pictures has
     more than twice as many samples as the other.
     """
-    fewer, more = sorted(float(each.samples.sum()) for each in (a, b))
-    tiles = [each.tile for picture in (a, b) for each in picture.scatter]
-    unknown = any(each.sharing > 1 and not each.scatter for each in (a, b))
-    if unknown or more > 2 * fewer or any((each != tiles[0]).any() for each in tiles):
+    fewer, more = sorted(float(picture.samples.sum()) for picture in (a, b))
+    tiles = [group.tile for picture in (a, b) for group in picture.scatter]
+    unknown = any(picture.sharing > 1 and not picture.scatter for picture in (a, b))
+    if unknown or more > 2 * fewer or any((tile != tiles[0]).any() for tile in tiles):
         return False
     samples = len(distinct(tiles[0].ravel().astype(np.intp))) if tiles else a.mean[..., 0].size
     return samples >= LEAST_SAMPLES
@@ -156,7 +156,7 @@ def _are_alike(a: Estimate, b: Estimate) -> bool:
 
 def _common_tiles(a: Estimate, b: Estimate) -> NDArray[np.int32] | None:
     """Return the tiles (H, W) of which the pixels of both pictures are independent; None: pixels are."""
-    return next((each.tile for picture in (a, b) for each in picture.scatter), None)
+    return next((group.tile for picture in (a, b) for group in picture.scatter), None)
 
 
 def _cautious(picture: Estimate) -> Estimate:
@@ -186,7 +186,7 @@ def p_values(a: Estimate, b: Estimate) -> Doubles:
 
     - Welch's t test (B. L. Welch, The Generalization of "Student's" Problem when Several Different
       Population Variances are Involved, 1947), for samples of different variance;
-    - Student's t test with a pooled variance. It protects few samples, which may have missed what is rare
+    - Student's t test with a pooled variance. It protects few samples, which may have missed rare events
       and bright and so look less noisy than they are, beside many;
     - the least p-value of the exact permutation test with as many samples, 2/C(m + n, m) (E. J. G. Pitman,
       Significance Tests which may be Applied to Samples from any Populations, 1937), for pixels whose
@@ -238,8 +238,8 @@ def _averaged(picture: Estimate, side: int) -> Estimate:
     if picture.scatter:
         label = _block_numbers(picture.mean.shape[0], picture.mean.shape[1], side)
         error = np.sqrt(picture.squared_error)
-        found = sums_by_label(error, picture.freedom[..., 0], picture.scatter, label, pixels.size)
-        variance, spread = (each.reshape(*pixels.shape[:2], 3) for each in found)
+        estimates = sums_by_label(error, picture.freedom[..., 0], picture.scatter, label, pixels.size)
+        variance, spread = (sums.reshape(*pixels.shape[:2], 3) for sums in estimates)
     else:
         variance = picture.sharing * _block_sums(picture.squared_error, side)
         spread = picture.sharing**3 * _block_sums(picture.squared_error**2 / picture.freedom, side)

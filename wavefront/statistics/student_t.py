@@ -23,10 +23,10 @@ def t_tail(t: Doubles, freedom: Doubles) -> Doubles:
     """
     tail = np.empty_like(t)
     for start in range(0, t.size, CHUNK):
-        part = slice(start, start + CHUNK)
-        squared, nu = np.square(t[part]), freedom[part]
+        span = slice(start, start + CHUNK)
+        squared, nu = np.square(t[span]), freedom[span]
         total = nu + squared
-        tail[part] = _incomplete_beta(nu / total, squared / total, nu / 2, np.full_like(nu, 0.5))
+        tail[span] = _incomplete_beta(nu / total, squared / total, nu / 2, np.full_like(nu, 0.5))
     return tail
 
 
