@@ -1,1 +1,1 @@
-"""AOVs, the layers beside the picture: what is known of surfaces, and of light, along the paths."""
+"""AOVs, the layers beside the picture: data of surfaces, and of light, along the paths."""

@@ -1,4 +1,4 @@
-"""Objects in a picture: boxes of what is seen of each shape and of the whole shape, and its silhouette.
+"""Objects in a picture: boxes of the visible part of each shape and of all of it, and its silhouette.
 
 The rays of the geometric AOVs go on behind each surface, so one pass finds all shapes that each pixel's
 center covers, whatever hides them.
@@ -67,7 +67,7 @@ def silhouettes(scene: CompiledScene, camera: Camera) -> Iterator[tuple[int, Boo
     width, height = camera.size
     view = scene.view(camera)
     spans = [_shapes_met(scene, view, pixel.astype(np.int64))[1] for _, pixel in pixel_spans(width * height)]
-    shape, at = (np.concatenate(each) for each in zip(*spans, strict=True))
+    shape, at = (np.concatenate(column) for column in zip(*spans, strict=True))
     order = np.argsort(shape, kind="stable")
     numbers, first = np.unique(shape.take(order), return_index=True)
     for number, pixels in zip(numbers.tolist(), np.split(at.take(order), first[1:]), strict=False):
@@ -81,19 +81,19 @@ def _shapes_met(
 ) -> tuple[tuple[Ints, Ints], tuple[Ints, Ints]]:
     """Return the shapes and pixels of nearest hits, and all distinct pairs of both."""
     rays = center_rays(scene, view, pixel.astype(np.uint32))
-    found: list[tuple[Ints, Ints]] = []
+    surfaces: list[tuple[Ints, Ints]] = []
     while len(rays):
         rays, hits = covering_hits(scene, rays)
         met = hits.found
         rays, hits, pixel = rays.take(met), hits.take(met), pixel.take(met)
-        found.append((scene.shape_numbers.of(hits), pixel))
+        surfaces.append((scene.shape_numbers.of(hits), pixel))
         if met.size:
             rays = continue_behind(rays, interaction(scene, rays, hits))
-    shape, at = (np.concatenate(each) for each in zip(*found, strict=True))
+    shape, at = (np.concatenate(column) for column in zip(*surfaces, strict=True))
     order = np.lexsort((shape, at))
     shape, at = shape.take(order), at.take(order)
     new = np.append(True, (np.diff(shape) != 0) | (np.diff(at) != 0))[: shape.size]
-    return found[0], (shape.compress(new), at.compress(new))
+    return surfaces[0], (shape.compress(new), at.compress(new))
 
 
 class _Extents:

@@ -1,4 +1,4 @@
-"""Points on surfaces that are carried to another time by what moves and deforms."""
+"""Points that are carried to another time by surfaces that move or deform."""
 
 from __future__ import annotations
 
@@ -32,10 +32,10 @@ def carried(
     """
     out = point.copy()
     for number in distinct(shape):
-        each = shapes[number]
-        if each.moves:
+        element = shapes[number]
+        if element.moves:
             lanes = np.flatnonzero(shape == number)
-            out[lanes] = _moved(each, face[lanes], point[lanes], start[lanes], end[lanes])
+            out[lanes] = _moved(element, face[lanes], point[lanes], start[lanes], end[lanes])
     return out
 
 
@@ -43,10 +43,10 @@ def _moved(shape: Any, face: Ints, point: Doubles, start: Doubles, end: Doubles)
     """Return where points (n, 3) of one shape are."""
     form = shape.mesh if isinstance(shape, Instance) else shape
     before, after = (_matrices(shape, times) for times in (start, end))
-    own = _applied(np.asarray(np.linalg.inv(before), np.float64), point)
+    local = _applied(np.asarray(np.linalg.inv(before), np.float64), point)
     if form.deformation is not None:
-        own = _reformed(form, face, own, start, end)
-    return _applied(after, own)
+        local = _reformed(form, face, local, start, end)
+    return _applied(after, local)
 
 
 def _matrices(shape: Any, times: Doubles) -> Doubles:
@@ -64,14 +64,14 @@ def _applied(matrices: Doubles, points: Doubles) -> Doubles:
     return np.asarray(m[..., 0] * x + m[..., 1] * y + m[..., 2] * z + m[..., 3])
 
 
-def _reformed(form: Any, face: Ints, own: Doubles, start: Doubles, end: Doubles) -> Doubles:
+def _reformed(form: Any, face: Ints, local: Doubles, start: Doubles, end: Doubles) -> Doubles:
     """Return where points (n, 3) on a shape that deforms are, in its own coordinates."""
     rest = form if form._rest is None else form._rest
     place = partial(_on_mesh, rest) if isinstance(rest, Mesh) else _on_primitives
-    out, forms = own.copy(), form.deformation.at
+    out, forms = local.copy(), form.deformation.at
     for first, second in {*zip(start.tolist(), end.tolist(), strict=True)}:
         lanes = np.flatnonzero((start == first) & (end == second))
-        out[lanes] = place(forms(first), forms(second), face[lanes], own[lanes])
+        out[lanes] = place(forms(first), forms(second), face[lanes], local[lanes])
     return out
 
 
@@ -84,14 +84,14 @@ def _on_mesh(mesh: Mesh, before: Any, after: Any, face: Ints, point: Doubles) ->
 
 
 def _on_primitives(before: Any, after: Any, number: Ints, point: Doubles) -> Doubles:
-    """Return where points (n, 3) of spheres are, or of what is about segments, which turn the shorter way."""
+    """Return where points (n, 3) of spheres are, or of cylinders and the like, which turn the shorter way."""
     if "centers" in before:
         return np.asarray(point + (after["centers"] - before["centers"]).take(number, 0), np.float64)
     (a, b), (c, d) = ([form[name].take(number, 0) for name in ("starts", "ends")] for form in (before, after))
     old, new = b - a, d - c
     length = _dots(old, old)[:, None]
-    part = _dots(point - a, old)[:, None] / np.where(length > 0, length, 1)
-    return np.asarray(c + part * new, np.float64) + _turned(point - a - part * old, _unit(old), _unit(new))
+    share = _dots(point - a, old)[:, None] / np.where(length > 0, length, 1)
+    return np.asarray(c + share * new, np.float64) + _turned(point - a - share * old, _unit(old), _unit(new))
 
 
 def _turned(v: Doubles, one: Doubles, other: Doubles) -> Doubles:
@@ -132,21 +132,21 @@ def weights_on(
         From vertices (3, n) to where they are in the scene; None where the points are in their coordinates.
     """
     following = np.minimum(face + 1, len(faces) - 1)
-    found = []
-    for each in (face, following):
-        a, b, c = vertices.take(faces.take(each, 0), 0).transpose(1, 2, 0)
+    weights = []
+    for number in (face, following):
+        a, b, c = vertices.take(faces.take(number, 0), 0).transpose(1, 2, 0)
         if placed is not None:
             a, b, c = placed(a), placed(b), placed(c)
-        found.append(barycentric(a, b, c, point.T))
-    beyond, further = (np.maximum(np.maximum(-b1, -b2), b1 + b2 - 1) for b1, b2 in found)
+        weights.append(barycentric(a, b, c, point.T))
+    beyond, further = (np.maximum(np.maximum(-b1, -b2), b1 + b2 - 1) for b1, b2 in weights)
     second = _are_quads(faces, vertices, face, following) & (further < beyond)
-    (b1, b2), (c1, c2) = found
+    (b1, b2), (c1, c2) = weights
     return np.where(second, following, face), np.where(second, c1, b1), np.where(second, c2, b2)
 
 
 def _are_quads(faces: Ints, vertices: Doubles, face: Ints, following: Ints) -> Bools:
     """Return whether faces (n,) are fans with those that follow: see `shapes/fans.py`."""
-    (a, _, c), (p, q, _) = (vertices.take(faces.take(each, 0).T, 0) for each in (face, following))
+    (a, _, c), (p, q, _) = (vertices.take(faces.take(number, 0).T, 0) for number in (face, following))
     return ((a == p) & (c == q)).all(1)
 
 

@@ -10,7 +10,7 @@ from .direct_light import is_direct
 
 
 class Clamp:
-    """Scales indirect light down to a limit, and keeps what is removed, (3, n) of n samples.
+    """Scales indirect light down to a limit, and keeps the rest, (3, n) of n samples.
 
     Parameters
     ----------

@@ -30,8 +30,8 @@ class Coverage:
 
     def record(self, scene: CompiledScene, paths: Paths, hits: Hits) -> None:
         """Record the first surfaces of paths."""
-        found = hits.found
-        self._seen[take(paths.slot, found)] = self._of_shape.take(scene.shape_numbers.of(hits.take(found)))
+        lanes = hits.found
+        self._seen[take(paths.slot, lanes)] = self._of_shape.take(scene.shape_numbers.of(hits.take(lanes)))
 
     def counts(self, samples: int, dropped: Ints) -> Iterator[tuple[str, Ints]]:
         """Yield each AOV, and how many samples of each pixel (k,) see a shape of that name."""

@@ -36,7 +36,7 @@ class DirectLight:
             add_to_slots(self.light, slot.take(lanes), take(arriving, lanes))
 
     def record_background(self, slot: Ints, color: Floats) -> None:
-        """Record what has arrived of a background, (3, k), and has been added to slots (k,)."""
+        """Record light (3, k) of a background that has been added to slots (k,)."""
         self.light[:, slot] += color
 
 

@@ -1,4 +1,4 @@
-"""Optical flow: where the pictures of other times show what each pixel shows, and whether they do."""
+"""Optical flow: where the pictures of other times show the point of each pixel, and whether they do."""
 
 from __future__ import annotations
 
@@ -48,19 +48,19 @@ class Flow:
         pixel
             (n,) row-major in the whole picture.
         shape, face, point
-            (n,) and (n, 3) what they show.
+            (n,) and (n, 3) of the surfaces that they show.
         """
         width = self.camera.resolution[0]
         film: Doubles = np.stack([pixel % width, pixel // width], 1) + np.float64(0.5)
         for name, which in FLOWS.items():
-            hidden = next(each for each, of in HIDDEN.items() if of == name)
+            hidden = next(layer for layer, of in HIDDEN.items() if of == name)
             if name not in names and hidden not in names:
                 continue
-            places, there, times = self._then(self.times[which], film, shape, face, point)
+            places, film_then, times = self._then(self.times[which], film, shape, face, point)
             if name in names:
-                yield name, self._shortest(there - film)
+                yield name, self._shortest(film_then - film)
             if hidden in names:
-                yield hidden, self._hidden(self.times[which], times, places, there)
+                yield hidden, self._hidden(self.times[which], times, places, film_then)
 
     def _delay(self, row: Doubles) -> Doubles:
         """Return how much later than the first row others (n,) are read, s."""
@@ -75,12 +75,12 @@ class Flow:
     ) -> tuple[Doubles, Doubles, Doubles]:
         """Return where points are in the picture of a time, (n, 3) and in pixels (n, 2), and when (n,)."""
         begin = self.start + self._delay(film[:, 1])
-        there = film
+        film_then = film
         for _ in range(ROUNDS if self.camera.rolling_shutter else 1):
-            end = time + self._delay(there[:, 1])
+            end = time + self._delay(film_then[:, 1])
             places = carried(self.shapes, shape, face, point, begin, end)
-            there = self.camera.project_at(places, end)[0]
-        return places, there, end
+            film_then = self.camera.project_at(places, end)[0]
+        return places, film_then, end
 
     def _shortest(self, flow: Doubles) -> Doubles:
         """Return flow (n, 2) the shorter way around a panorama."""
@@ -89,7 +89,7 @@ class Flow:
             flow[:, 0] -= width * np.rint(flow[:, 0] / width)
         return flow
 
-    def _hidden(self, time: float, times: Doubles, places: Doubles, there: Doubles) -> NDArray[np.int32]:
+    def _hidden(self, time: float, times: Doubles, places: Doubles, film_then: Doubles) -> NDArray[np.int32]:
         """Return 1 for points (n, 3) that the picture of a time does not show: hidden, or beside it; else 0.
 
         Parameters
@@ -100,37 +100,37 @@ class Flow:
             (n, 2) in pixels of the whole picture.
         """
         x0, y0, x1, y1 = self.camera.window
-        inside = (there >= (x0, y0)).all(1) & (there < (x1, y1)).all(1)
+        inside = (film_then >= (x0, y0)).all(1) & (film_then < (x1, y1)).all(1)
         lanes = np.flatnonzero(inside)
         hidden: NDArray[np.int32] = np.where(inside, 0, 1).astype(np.int32)
         if lanes.size:
-            hidden[lanes] = self._covered(time, times[lanes], places[lanes], there[lanes])
+            hidden[lanes] = self._covered(time, times[lanes], places[lanes], film_then[lanes])
         return hidden
 
-    def _covered(self, time: float, times: Doubles, places: Doubles, there: Doubles) -> Bools:
+    def _covered(self, time: float, times: Doubles, places: Doubles, film_then: Doubles) -> Bools:
         """Return whether something is nearer to the camera than points (n, 3), on their way to it."""
         scene = self.scene_at(time)
-        rays = self._rays(scene, times, there)
+        rays = self._rays(scene, times, film_then)
         moved, hits = covering_hits(scene, rays)
-        origin, direction = (each.astype(np.float64) for each in (rays.origin, rays.direction))
+        origin, direction = (vectors.astype(np.float64) for vectors in (rays.origin, rays.direction))
         met = dot(
             moved.origin.astype(np.float64) + moved.direction.astype(np.float64) * hits.t - origin, direction
         )
         far = dot((places * scene.scale - scene.center).T - origin, direction)
         return np.asarray((hits.prim != -1) & (met < far * (1 - NEARER)))
 
-    def _rays(self, scene: CompiledScene, times: Doubles, there: Doubles) -> Rays:
+    def _rays(self, scene: CompiledScene, times: Doubles, film_then: Doubles) -> Rays:
         """Return the rays of film points (n, 2) of the camera as it is at times (n,)."""
         n, origin, direction = len(times), [], []
         order = np.argsort(times, kind="stable")
         for lanes in np.split(order, np.flatnonzero(np.diff(times[order])) + 1):
             view = scene.view(self.camera.at(float(times[lanes[0]])))
-            x, y = there[lanes].T.astype(f4)
+            x, y = film_then[lanes].T.astype(f4)
             start, along = view.rays(x, y, scene.center)
             origin.append(start)
             direction.append(along)
         back = np.argsort(order, kind="stable")
-        starts, ways = (np.concatenate(each, 1)[:, back] for each in (origin, direction))
+        starts, ways = (np.concatenate(pieces, 1)[:, back] for pieces in (origin, direction))
         rays = Rays(starts, ways, np.full(n, -1, np.intp))
         if scene.motion is not None:
             rays.time = times

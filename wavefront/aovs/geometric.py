@@ -1,4 +1,4 @@
-"""The geometric AOVs of a picture: what the ray through the center of each pixel and of the lens meets.
+"""The geometric AOVs of a picture: the first hit of the ray through the center of each pixel and the lens.
 
 Nothing in them is random or filtered. A surface with alpha is met where its opacity is at least 0.5.
 """
@@ -187,7 +187,7 @@ def _uv(
     """
     face, shapes, first = scene.shape_numbers.face(hits), corners.shapes, point
     if rays.time is not None:
-        start = min((each.time_span[0] for each in shapes if each.moves), default=0.0)
+        start = min((element.time_span[0] for element in shapes if element.moves), default=0.0)
         first = carried(shapes, shape, face, point, rays.time, np.full(len(point), start))
     uv = corners.uv(shape, face, first)
     curved = np.flatnonzero(hits.prim >= scene.triangles)
@@ -205,7 +205,7 @@ def _uv(
 def _points(scene: CompiledScene, center: Rays, moved: Rays, hits: Hits) -> tuple[Doubles, Doubles]:
     """Return the points that rays meet, (n, 3), and their distances (n,), in the scene's own unit.
 
-    `moved` are the rays behind what they have passed, a little beside the line. The points are on it.
+    `moved` are the rays behind passed surfaces, a little beside the line. The points are on it.
     """
     direction = center.direction.astype(np.float64)
     direction /= length(direction)
@@ -248,7 +248,7 @@ class _Corners:
             return vertex
         used = distinct(number)
         lane = np.searchsorted(used, number)
-        placed = [self.shapes[each] for each in used]
+        placed = [self.shapes[shape_number] for shape_number in used]
         m = np.stack([shape.transform for shape in placed if isinstance(shape, Instance)])
         m = m.take(lane, 0).transpose(1, 2, 0)
         x, y, z = vertex

@@ -48,9 +48,9 @@ class LightByGroup:
         mixed = np.flatnonzero(group < 0)
         if mixed.size:
             assert toward is not None
-            for name, part in groups.parts_of_environment(take(toward, mixed)):
+            for name, share in groups.parts_of_environment(take(toward, mixed)):
                 light = self.light[groups.names.index(name)]
-                add_to_slots(light, slot.take(mixed), take(arriving, mixed) * part)
+                add_to_slots(light, slot.take(mixed), take(arriving, mixed) * share)
 
     def _add(self, group: Ints, slot: Ints, arriving: Floats) -> None:
         count, channels, n = self.light.shape

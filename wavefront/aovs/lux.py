@@ -29,8 +29,8 @@ def lux_of(efficacies: Sequence[float], parts: Sequence[Floats]) -> Floats:
     44(5), 1990. Numbers that are photometric themselves have 1.
     """
     out = np.zeros((3, parts[0].shape[1]), f4)
-    for efficacy, part in zip(efficacies, parts, strict=True):
-        light = f4(efficacy) * luminance(part)
+    for efficacy, rgb in zip(efficacies, parts, strict=True):
+        light = f4(efficacy) * luminance(rgb)
         out[0] += light
         out[1 if 1 < efficacy < BROADBAND else 2] += light
     return out

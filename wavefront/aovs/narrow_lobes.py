@@ -64,6 +64,6 @@ class NarrowLobes:
 
     def result(self, samples: int, dropped: Ints) -> Floats:
         """Return the highest channel of each sample, (samples, k); 0 of `dropped` ones."""
-        found = highest(self.throughput)
-        found[dropped] = 0
-        return np.where(np.isfinite(found), found, f4(0)).reshape(samples, -1)
+        peaks = highest(self.throughput)
+        peaks[dropped] = 0
+        return np.where(np.isfinite(peaks), peaks, f4(0)).reshape(samples, -1)

@@ -41,7 +41,7 @@ class Noted:
         add_to_slots(sums, paths.slot, np.broadcast_to(values, (3, len(paths))) * f4(share))
 
     def check(self, integrator: str) -> None:
-        """Check that the integrator has noted what is asked for."""
+        """Check that the integrator has noted the AOVs that are asked for."""
         for name in self.values.keys() - self._seen:
             raise SceneError(
                 f"the integrator {integrator} cannot give the AOV {name!r}: it must call "

@@ -33,7 +33,7 @@ from .noted import Noted
 
 FEATURES = ("denoising_albedo", "denoising_normal")
 OF_LIGHT = ("direct", "indirect", "light_groups", CLAMPED)
-BY_LIGHT = ("light_groups", LUX)  # what parts of the light are told apart for by the light they are from
+BY_LIGHT = ("light_groups", LUX)  # AOVs for which light is divided by its sources
 
 
 @soa
@@ -82,8 +82,8 @@ class SampleRecorder(PathRecorder):
         self._light.update(self._noted.values)
         several = LUX in wanted and len(scene.light_efficacies.names) > 1  # else it follows from the radiance
         self._efficacies = LightByGroup(scene.light_efficacies, n) if several else None
-        self._divided = [each for each in (self._groups, self._efficacies) if each is not None]
-        self.needs_directions = any(each.groups.need_directions for each in self._divided)
+        self._divided = [by_group for by_group in (self._groups, self._efficacies) if by_group is not None]
+        self.needs_directions = any(by_group.groups.need_directions for by_group in self._divided)
         self._awaited: AwaitedSurfaces | None = None
         self._begun = False
         self._all_rough = True  # no first surface is specular
@@ -108,7 +108,7 @@ class SampleRecorder(PathRecorder):
         self._share /= ways
 
     def of_shared(self, count: int) -> PathRecorder:
-        """Return what divides the light of so many shared points among the groups of lights."""
+        """Return a recorder that divides the light of `count` shared points among the groups of lights."""
         wanted = [name for name in BY_LIGHT if name in self._wanted and self._divided]
         wanted += [NARROW] if self._narrow is not None else []
         if not wanted:
@@ -129,7 +129,7 @@ class SampleRecorder(PathRecorder):
     # --- Surfaces -------------------------------------------------------------------------------------
 
     def record_hits(self, leg: Leg) -> None:
-        """Record what paths meet next; see `PathRecorder`."""
+        """Record the next hits of paths; see `PathRecorder`."""
         self._shade_awaited()
         (scene, paths, hits), first, self._begun = (leg.scene, leg.paths, leg.hits), not self._begun, True
         if self._narrow is not None:
@@ -225,22 +225,22 @@ class SampleRecorder(PathRecorder):
             self._picture = np.empty(0, f4)  # no integrator returns this
         if self._direct is not None and paths.depth is not None:
             self._direct.record(paths, contribution, slot, arriving)
-        for each in self._divided:
-            each.record(paths, contribution, slot, arriving)
+        for by_group in self._divided:
+            by_group.record(paths, contribution, slot, arriving)
 
     def note(self, name: str, paths: Paths, values: Floats) -> None:
         """Record numbers of a user's own; see `integrators.note`."""
         self._noted.note(name, paths, values, self._share)
 
     def record_background(self, slot: Ints, color: Floats) -> None:
-        """Record what has arrived of a background, (3, k), and has been added to slots (k,)."""
+        """Record light (3, k) of a background that has been added to slots (k,)."""
         if self._direct is not None:
             self._direct.record_background(slot, color)
 
     # --- The result -----------------------------------------------------------------------------------
 
     def finish(self, integrator: object, radiance: Floats) -> Bools:
-        """Record what is left, and return a mask (n,) of the slots whose AOVs are all finite.
+        """Record the rest, and return a mask (n,) of the slots whose AOVs are all finite.
 
         Parameters
         ----------
@@ -323,8 +323,8 @@ def recorded_aovs(wanted: Sequence[str], scene: CompiledScene) -> tuple[str, ...
 def _opacity(paths: Paths, hits: Hits) -> Floats:
     """Return how much of the background camera paths (n,) hide: all where they meet anything, else by media.
 
-    Media leave the part by which the throughput of its channels weighs a gray background. That is never above
-    2, as what paths are weighted with where media scatter has a mean of 1 over the channels.
+    Media leave the part by which the throughput of its channels weighs a gray background. It is at most
+    2, as the weights of paths where media scatter have a mean of 1 over the channels.
     """
     red, green, blue = paths.throughput
     left = np.minimum((red + green + blue) / f4(3), f4(2))

@@ -42,7 +42,7 @@ class Frame:
 
     def take(self, lanes: Lanes) -> Frame:
         """Return the frames of some columns."""
-        return Frame(*(take(each, lanes) for each in (self.z, self.sign, self.a, self.z0)))
+        return Frame(*(take(array, lanes) for array in (self.z, self.sign, self.a, self.z0)))
 
     @property
     def x(self) -> Floats:

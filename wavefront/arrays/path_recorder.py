@@ -31,7 +31,7 @@ class PathRecorder:
         """Note that each path goes on in several ways."""
 
     def of_shared(self, count: int) -> PathRecorder:
-        """Return what looks on where paths begin anew at so many shared points."""
+        """Return the recorder of paths that begin anew at `count` shared points."""
         return NOBODY
 
     def parts_of_shared(self) -> list[tuple[Floats, Floats]]:
@@ -39,7 +39,7 @@ class PathRecorder:
         return []
 
     def record_hits(self, leg: Any) -> None:
-        """Record what paths have met at the end of a `Leg`, after the light there."""
+        """Record the hits of paths at the end of a `Leg`, after the light there."""
 
     def record_surfaces(self, scene: Any, paths: Paths, shade: Any) -> None:
         """Record the surfaces that paths have met, which are ready to shade."""
@@ -60,7 +60,7 @@ class PathRecorder:
         """Record numbers (n,) or (3, n) of a user's own about paths."""
 
     def record_background(self, slot: Ints, color: Floats) -> None:
-        """Record what has arrived of a background, (3, k), and has been added to slots (k,)."""
+        """Record light (3, k) of a background that has been added to slots (k,)."""
 
 
 NOBODY = PathRecorder()  # where nothing else looks on

@@ -48,7 +48,7 @@ def _first(values: Any) -> str:
 
 @cache
 def _names(kind: type) -> tuple[str, ...]:
-    return tuple(each.name for each in fields(kind))
+    return tuple(field.name for field in fields(kind))
 
 
 class SoA:
@@ -145,7 +145,7 @@ class Rays(SoA):
     origin: Floats  # (3, n) start of the ray, scene units
     direction: Floats  # (3, n) unit direction
     exclude_prim: Ints  # (n,) primitive that the ray starts on, -1 for none
-    # (4, n) stack of what the rays are inside of; None in scenes without a `MediaTable`
+    # (4, n) stack of the media around the rays; None in scenes without a `MediaTable`
     media: Any = field(default=None, kw_only=True)
     # (n,) time of the scene, s, float64; None in scenes where nothing moves while the shutter is open
     time: Doubles | None = field(default=None, kw_only=True)
@@ -171,7 +171,7 @@ class Paths(Rays):
     roulette_scale: Floats  # (n,) throughput times this decides about roulette: see `stages.compact.roulette`
     glow: Floats | None = None  # (3, n) light that media have sent since the last event; None where none does
     prev_vertex: Floats | None = None  # (3, n) where the paths last scattered; None where that is `origin`
-    # what lights were sampled for there (lights/base.py); None where no light of the scene takes it
+    # `Receiver` of the light samples there; None where no light of the scene takes it
     left_receiver: Any = None
     # (n,) paths from lights reach the first surface of the path, as no shadow catcher was passed before,
     # and it was left by a lobe that is not a delta lobe; None without light tracing

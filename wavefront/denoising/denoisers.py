@@ -59,5 +59,5 @@ def denoise(picture: NoisyPicture, denoiser: str = "auto") -> tuple[Floats, str]
 
 def _scaling(before: Floats, after: Floats, where: Bools) -> np.float32:
     """Return the factor that gives pixels `where` (H, W, 1) of `after` their mean in `before`."""
-    total, wanted = (each.sum(where=where, dtype=np.float64) for each in (after, before))
+    total, wanted = (pixels.sum(where=where, dtype=np.float64) for pixels in (after, before))
     return np.float32(np.clip(wanted / total, 1 - MOST_SCALING, 1 + MOST_SCALING) if total > 0 else 1)

@@ -72,7 +72,7 @@ def noisy_picture(
     errors: Mapping[str, Floats],
     spp: int = 0,
 ) -> NoisyPicture:
-    """Return what denoisers are given for a picture (H, W, 3), its error, layers, their errors and samples.
+    """Return the input of denoisers: a picture (H, W, 3), its error, layers, their errors and samples.
 
     Values that are not finite are replaced by those of pixels about them. An error that is not known is
     estimated from the picture itself.

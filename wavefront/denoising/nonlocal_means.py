@@ -97,7 +97,7 @@ class _Likeness:
 
     @classmethod
     def of(cls, compared: _Noisy, damping: float, patch: int, guides: list[_Limit]) -> _Likeness:
-        """Take what is compared, without a margin."""
+        """Return the likeness by a picture and its guides, without a margin."""
         variance = compared.variance + np.float32(LEAST_VARIANCE)
         wide = _Noisy(_mirrored(compared.mean, patch), _mirrored(variance, patch))
         return cls(wide, damping, patch, guides)
@@ -105,7 +105,7 @@ class _Likeness:
     def weights(self, here: Window, there: Window) -> tuple[Floats, Floats]:
         """Return the weights of `there` in the means of `here`, and of `here` in those of `there`.
 
-        The distance is the squared difference less what noise explains of it, in units of the noise (2012,
+        The distance is the squared difference less the part that noise explains, in units of the noise (2012,
         equation 3): (d² − v − min(v, w)) / (k²·(v + w)) with the variance v of the pixel whose mean is taken,
         and w. For the other pixel v and w change places, and with them v/(v + w) and 1 − v/(v + w).
         """
@@ -115,22 +115,22 @@ class _Likeness:
         rest = _squared_difference(self.compared.mean, own, other)
         rest -= np.minimum(v, w)
         rest /= total
-        part = np.divide(v, total, out=total)
+        ratio = np.divide(v, total, out=total)
         unit = 1 / (FARTHEST * self.damping**2)
-        rest, part = (_patch_means(each, self.patch, unit) for each in (rest, part))
+        rest, ratio = (_patch_means(image, self.patch, unit) for image in (rest, ratio))
         closeness = np.subtract(np.float32(1), rest, out=rest)
         limit = self._limit(here, there)
-        first = _weight(closeness + part, limit)
+        first = _weight(closeness + ratio, limit)
         closeness += np.float32(unit)
-        closeness -= part
+        closeness -= ratio
         return first, _weight(closeness, limit)
 
     def _limit(self, here: Window, there: Window) -> Floats | np.float32:
-        """Return what closeness is at most."""
-        found: Floats | np.float32 = np.float32(1)
+        """Return the limit of closeness by the guides."""
+        limit: Floats | np.float32 = np.float32(1)
         for guide in self.guides:
-            found = np.minimum(guide.closeness(here, there), found)
-        return found
+            limit = np.minimum(guide.closeness(here, there), limit)
+        return limit
 
 
 def _weight(closeness: Floats, limit: Floats | np.float32) -> Floats:
@@ -150,13 +150,13 @@ def _filtered(guide: Guide) -> _Noisy:
 
 
 def _visible(variance: Floats, mean: Floats) -> Floats:
-    """Return how much of the noise (h, w) is removed: little of what nobody sees, which costs detail."""
+    """Return the part of the noise (h, w) to remove: little where nobody sees it, as that costs detail."""
     seen = np.square(np.float32(VISIBLE) * mean).sum(0)
     return variance / (variance + seen + np.float32(LEAST_VARIANCE))
 
 
 def _trust(variance: Floats) -> Floats:
-    """Return what pixels (h, w) count for: less than 1 where far more noise is than about them.
+    """Return the weights of pixels (h, w): less than 1 where far more noise is than about them.
 
     Such pixels have a rare bright sample, which the mean over a window would show as a bright square.
     """
@@ -167,14 +167,14 @@ def _trust(variance: Floats) -> Floats:
 
 def _weighted_means(averaged: _Noisy, trust: Floats, likeness: _Likeness, reach: int) -> _Noisy:
     """Return the weighted means over windows that reach so far, and their variances."""
-    found = _Noisy(np.empty_like(averaged.mean), np.empty_like(averaged.variance))
+    means = _Noisy(np.empty_like(averaged.mean), np.empty_like(averaged.variance))
 
     def fill(tile: Window) -> None:
-        found.mean[:, *tile], found.variance[tile] = _means_of_tile(averaged, trust, likeness, reach, tile)
+        means.mean[:, *tile], means.variance[tile] = _means_of_tile(averaged, trust, likeness, reach, tile)
 
     with ThreadPoolExecutor(core_count()) as threads:
         list(threads.map(fill, _tiles(*averaged.variance.shape)))
-    return found
+    return means
 
 
 def _means_of_tile(
@@ -218,7 +218,7 @@ def _pairs(tile: Window, size: tuple[int, ...], reach: int) -> Iterator[tuple[Wi
                 slice(max(t.start - max(by, 0), -by, 0), min(t.stop - min(by, 0), n - max(by, 0)))
                 for t, by, n in zip(tile, shift, size, strict=True)
             )
-            if all(each.start < each.stop for each in here):
+            if all(side.start < side.stop for side in here):
                 rows, columns = here
                 yield (
                     (rows, columns),
@@ -226,13 +226,13 @@ def _pairs(tile: Window, size: tuple[int, ...], reach: int) -> Iterator[tuple[Wi
                 )
 
 
-def _shifted(part: slice, by: int) -> slice:
-    return slice(part.start + by, part.stop + by)
+def _shifted(span: slice, by: int) -> slice:
+    return slice(span.start + by, span.stop + by)
 
 
 def _grown(window: Window, margin: int) -> Window:
     """Return where a window with a margin is in an array with that margin."""
-    rows, columns = (slice(each.start, each.stop + 2 * margin) for each in window)
+    rows, columns = (slice(side.start, side.stop + 2 * margin) for side in window)
     return rows, columns
 
 
@@ -259,13 +259,13 @@ def _moved(window: Window, origin: Window, target: Window) -> Window:
 
 def _squared_difference(values: Floats, here: Window, there: Window) -> Floats:
     """Return the sums over channels of squared differences of values (3, h, w)."""
-    found: Floats | None = None
+    total: Floats | None = None
     for channel in values:
         square = channel[here] - channel[there]
         square *= square
-        found = square if found is None else np.add(found, square, out=found)
-    assert found is not None
-    return found
+        total = square if total is None else np.add(total, square, out=total)
+    assert total is not None
+    return total
 
 
 def _planes(values: Floats) -> Floats:

@@ -40,8 +40,8 @@ class Backdrop(Feature):
 class Background(Feature):
     """Shows a background in place of the light at infinity.
 
-    It is no light: it belongs to no group of lights, and no other path meets it. Of it arrives what media on
-    the way have left.
+    It is no light: it belongs to no group of lights, and no other path meets it. Media on the way weaken
+    it.
     """
 
     camera_only = True

@@ -1,4 +1,4 @@
-"""Caustics: what paths from the camera leave to paths from lights (integrators/light_tracing.py)."""
+"""Caustics: light that paths from the camera leave to paths from lights (integrators/light_tracing.py)."""
 
 from __future__ import annotations
 
@@ -55,8 +55,8 @@ class Caustics(Feature):
         emission, traced = leg.emission, leg.paths.light_traced
         assert traced is not None
         lanes = emission.lanes
-        found = take(traced, lanes) & take(leg.paths.specular, lanes)
-        found &= self.specular.includes(take(leg.left, lanes)) & (leg.hits.prim.take(lanes) >= 0)
-        found &= leg.scene.lights.chosen_from.take(emission.light)
-        if found.any():
-            leg.emission = emission.take(np.flatnonzero(~found))
+        left_out = take(traced, lanes) & take(leg.paths.specular, lanes)
+        left_out &= self.specular.includes(take(leg.left, lanes)) & (leg.hits.prim.take(lanes) >= 0)
+        left_out &= leg.scene.lights.chosen_from.take(emission.light)
+        if left_out.any():
+            leg.emission = emission.take(np.flatnonzero(~left_out))

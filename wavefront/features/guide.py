@@ -22,9 +22,9 @@ class GuidedShading(Shading):
     def prepare(self, scene: CompiledScene) -> None:
         """Look up the tables of the surfaces."""
         super().prepare(scene)
-        found = scene.program.find(Guide)
-        assert found is not None
-        guide(self, found.table)
+        feature = scene.program.find(Guide)
+        assert feature is not None
+        guide(self, feature.table)
 
     def density(self, lanes: Lanes, world: Floats, pdf: Floats) -> Floats:
         """Return the densities (k,) of directions, those of BSDFs and tables."""

@@ -25,11 +25,11 @@ class InstancedSurfaces(Surfaces):
         self.instances = None if hits.instance is None else scene.instances.take(hits.instance)
 
     @classmethod
-    def hits_of(cls, scene: CompiledScene, found: Intersections) -> Hits:
+    def hits_of(cls, scene: CompiledScene, intersections: Intersections) -> Hits:
         """Return hits with the columns of their instances."""
-        hits = super().hits_of(scene, found)
+        hits = super().hits_of(scene, intersections)
         assert scene.instances is not None
-        hits.prim, hits.instance = scene.instances.locate(found.prim)
+        hits.prim, hits.instance = scene.instances.locate(intersections.prim)
         return hits
 
     @classmethod

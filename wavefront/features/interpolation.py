@@ -20,10 +20,10 @@ class InterpolatedSurfaces(Surfaces):
     __slots__ = ()
 
     @classmethod
-    def hits_of(cls, scene: CompiledScene, found: Intersections) -> Hits:
+    def hits_of(cls, scene: CompiledScene, intersections: Intersections) -> Hits:
         """Return hits with their barycentric weights."""
-        hits = super().hits_of(scene, found)
-        hits.b1, hits.b2 = found.b1, found.b2
+        hits = super().hits_of(scene, intersections)
+        hits.b1, hits.b2 = intersections.b1, intersections.b2
         return hits
 
 

@@ -1,4 +1,4 @@
-"""Media that need to know what rays are inside of: they scatter, emit, or are around other things."""
+"""Media that need the stacks of rays: they scatter, emit, or are around other shapes."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ class ShadingInMedia(Shading):
     __slots__ = ()
 
     def prepare(self, scene: CompiledScene) -> None:
-        """Find the points within media, and what crossing the surfaces does to stacks."""
+        """Find the points within media, and the changes of stacks at the surfaces."""
         super().prepare(scene)
         self.volume = np.flatnonzero(self.surface.prim < 0)
         self.crossing = crossings(scene, self.surface)
@@ -41,7 +41,7 @@ class ShadingInMedia(Shading):
         return cos, cos_g
 
     def enter(self, rays: ShadowRays, of: LightRays) -> None:
-        """Note what shadow rays begin inside of."""
+        """Note the media around the origins of shadow rays."""
         super().enter(rays, of)
         stack = of.paths.media[:, : of.cos_g.size]
         if self.crossing is not None:
@@ -49,7 +49,7 @@ class ShadingInMedia(Shading):
         begin_in_media(of.scene, rays, of.paths, stack, of.lanes, of.light, of.sampler, of.bounce)
 
     def leave(self, paths: Paths, left: Paths, cos_g: Floats, bounce: int) -> None:
-        """Note what paths have entered and left."""
+        """Note the media that paths have entered and left."""
         super().leave(paths, left, cos_g, bounce)
         if self.crossing is not None:
             left.media = stacks_leaving(paths.media, self.crossing, cos_g)
@@ -80,7 +80,7 @@ class SurfacesAndEvents(Surfaces):
 
 @soa
 class Media(Feature):
-    """Scatters and weakens rays within media, and notes what they are inside of."""
+    """Scatters and weakens rays within media, and notes the media around them."""
 
     shading = ShadingInMedia
     surfaces = SurfacesAndEvents
@@ -91,7 +91,7 @@ class Media(Feature):
         return None if facts.compiled.media is None else cls()
 
     def begin(self, scene: CompiledScene, paths: Paths) -> None:
-        """Find out what paths begin inside of."""
+        """Find the media around the origins of paths."""
         paths.media = stacks_at(scene, paths.origin, paths.time)
 
     def walk(self, leg: Leg, lanes: Ints, segment: int) -> Ints:
@@ -99,11 +99,11 @@ class Media(Feature):
         return fly(leg, lanes, segment)
 
     def dim(self, part: Floats, scene: CompiledScene, rays: ShadowRays, length: Floats, end: Bools) -> None:
-        """Weaken shadow rays by what is in their media."""
+        """Weaken shadow rays by their media."""
         dim(part, scene, rays, length, end)
 
     def cross(self, passage: Passage) -> None:
-        """Note what rays are inside of behind surfaces."""
+        """Note the media around rays behind surfaces."""
         passage.rays.media = cross(passage.scene, passage.rays.media, passage.surface)
 
     def tilt(self, scene: CompiledScene, rays: Rays, surface: SurfaceInteraction) -> None:
@@ -114,7 +114,7 @@ class Media(Feature):
 
 @soa
 class Glow(Feature):
-    """Adds what media have sent along paths."""
+    """Adds the light that media have emitted along paths."""
 
     @classmethod
     def of(cls, facts: Facts) -> Self | None:

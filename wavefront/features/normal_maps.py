@@ -1,4 +1,4 @@
-"""Normal maps and bump maps: see stages/normal_mapping.py for what they do to normals and scattering."""
+"""Normal maps and bump maps: see stages/normal_mapping.py for their effect on normals and scattering."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ class MappedShading(Shading):
         return f, pdf
 
     def cosines(self, local: Floats, world: Floats) -> tuple[Floats, Floats]:
-        """Return the cosines, the first less by what tilted normals shadow."""
+        """Return the cosines, the first weakened by the shadowing of tilted normals."""
         cos, cos_g = super().cosines(local, world)
         if self.surface.unmapped is not None:
             cos = cos * unshadowed(self.surface, world)

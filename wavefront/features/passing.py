@@ -17,7 +17,7 @@ class Passing(Feature):
     def of(cls, facts: Facts) -> Self | None:
         """Return the feature of a scene with surfaces that rays may pass, or with media."""
         some = [*facts.found, *facts.given]
-        needed = any(acts(each, point) for each in some for point in ("passable", "walk"))
+        needed = any(acts(feature, point) for feature in some for point in ("passable", "walk"))
         return cls() if needed else None
 
     def fly(self, leg: Leg) -> None:

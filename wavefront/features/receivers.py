@@ -16,7 +16,7 @@ class ReceivingShading(Shading):
     __slots__ = ()
 
     def prepare(self, scene: CompiledScene) -> None:
-        """Note what lights shine on, once for all samples, and for rays that they could replace."""
+        """Note the receivers of lights, once for all samples, and for rays that they could replace."""
         super().prepare(scene)
         self.receiver = receiver_of(self.surface, self.groups)
         if scene.lights.texels is not None:

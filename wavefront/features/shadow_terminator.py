@@ -23,7 +23,7 @@ from ..stages.interaction import Surfaces, at_corners
 from ..stages.shade import Shading
 
 # of normals at vertices with that of the triangle: those of a box lean by 55°, and a round surface for them
-# would bulge through what is beside it
+# would bulge through shapes beside it
 LEAST_COSINE = f4(0.7071)
 
 
@@ -59,7 +59,7 @@ class RoundSurfaces(Surfaces):
         assert scene.corner_normals is not None
         total = np.zeros((3, lanes.size), f4)
         for corner, normal in enumerate(at_corners(scene.corner_normals, some, scene.triangles)):
-            one, other = (weights[each] for each in range(3) if each != corner)
+            one, other = (weights[vertex] for vertex in range(3) if vertex != corner)
             below = side * (one * k[2 * corner] + other * k[2 * corner + 1])  # of the plane at the vertex
             total += normal * (weights[corner] * side * np.maximum(-below, f4(0)))
         lift[:, lanes] = total
@@ -96,7 +96,7 @@ class RoundShading(Shading):
         return cos, cos_g
 
     def unmet(self, prim: Ints, direction: Floats, lanes: Lanes) -> Ints:
-        """Return what rays do not meet: nothing where they start above their triangles and dive."""
+        """Return the primitives that rays ignore: none where they start above their triangles and dive."""
         prim = super().unmet(prim, direction, lanes)
         if self.surface.lift is None:
             return prim
@@ -144,7 +144,7 @@ def heights_of(corners: Floats, normals: tuple[Floats, ...], ng: Floats) -> Floa
     bent = np.flatnonzero(upright & np.logical_or.reduce([(normal != ng).any(0) for normal in normals]))
     points = corners[bent].transpose(1, 2, 0)
     for corner, normal in enumerate(normals):
-        others = [each for each in range(3) if each != corner]
+        others = [vertex for vertex in range(3) if vertex != corner]
         for row, other in enumerate(others):
             away = points[other] - points[corner]
             heights[2 * corner + row, bent] = (away * normal.take(bent, 1)).sum(0)

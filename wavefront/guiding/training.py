@@ -1,4 +1,4 @@
-"""Tables from what paths found: where much light came from, directions get a high density.
+"""Tables from the light that paths found: directions from which much came get a high density.
 
 Sources: H. W. Jensen, "Importance Driven Path Tracing using the Photon Map", Rendering Techniques 1995, for
 histograms of incident light; T. Müller, M. Gross and J. Novák, "Practical Path Guiding", Computer Graphics
@@ -37,7 +37,7 @@ class Records(SoA):
     cell: Ints  # (m,) where it left the surface
     bins: Ints  # (m,) bin of the direction
     incident: Floats  # (m,) light that arrived from there, times the cosine, sum of the channels
-    scattered: Floats  # (m,) what it gave, relative to the throughput before: times f in place of 1
+    scattered: Floats  # (m,) its contribution, relative to the throughput before: times f in place of 1
     pdf: Floats  # (m,) density with which the direction was drawn, 1/sr
     pdf_bsdf: Floats  # (m,) that of the BSDF alone
 
@@ -59,9 +59,9 @@ def build_table(records: Records, cells: GuideCells) -> GuideTable:
         rich = np.flatnonzero(counts >= ENOUGH)
         if rich.size:
             flat = row_of.reshape(-1)
-            own = _spread(_histograms(cell, rich, records.bins, weight, row_of.size))
+            histograms = _spread(_histograms(cell, rich, records.bins, weight, row_of.size))
             parents = densities[flat[rich]]
-            densities = np.concatenate([densities, _blended(own, parents, counts[rich])])
+            densities = np.concatenate([densities, _blended(histograms, parents, counts[rich])])
             flat[rich] = len(densities) - rich.size + np.arange(rich.size)
     used, row_of = np.unique(row_of.reshape(-1), return_inverse=True)
     return GuideTable.of_bins(cells, row_of, densities[used], np.full(used.size, FIRST_SHARE))
@@ -131,5 +131,5 @@ def _spread(contents: Doubles) -> Doubles:
 def _blended(contents: Doubles, parents: Doubles, counts: Ints) -> Doubles:
     """Return probabilities (k, side²) of contents, blended with those of the larger cells."""
     total = contents.sum(1, keepdims=True)
-    own = np.where(total > 0, contents / np.where(total > 0, total, 1), parents)
-    return np.asarray((counts[:, None] * own + PRIOR * parents) / (counts[:, None] + PRIOR))
+    probabilities = np.where(total > 0, contents / np.where(total > 0, total, 1), parents)
+    return np.asarray((counts[:, None] * probabilities + PRIOR * parents) / (counts[:, None] + PRIOR))

@@ -1,4 +1,4 @@
-"""Media: what fills the space inside shapes."""
+"""Media that fill the space inside shapes."""
 
 from .base import BaseMedium, Flight, MediumRecord
 from .grid import GridMedium

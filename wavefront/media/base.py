@@ -1,8 +1,8 @@
 """The contract of every medium.
 
-A `BaseMedium` is what a material or a scene holds. For a render it gives a `MediumRecord`, which holds k
+A `BaseMedium` is an object of a material or a scene. For a render it gives a `MediumRecord`, which holds k
 media of one kind, a column each. A record is asked two things about n rays, each within one of its media:
-how far light gets (`sample`), and what part of it gets over a given length (`transmittance`). Positions are
+how far light gets (`sample`), and which part of it passes a given length (`transmittance`). Positions are
 relative to the scene's center.
 
 Both follow the radiative transfer equation along a ray of direction ω,
@@ -43,7 +43,7 @@ class Flight(SoA):
     """How far rays get in their media."""
 
     t: Floats  # (n,) distance at which light is scattered, scene units; inf where it gets through
-    weight: Floats  # (3, n) of what comes from there, over the density of getting there
+    weight: Floats  # (3, n) of the light from there, over the density of getting there
     light: Floats | None = None  # (3, n) emitted on the way, as it arrives at the origin; None for none
 
 

@@ -24,26 +24,26 @@ from .voxels import Voxels, bounds_in_cells
 MOST_CELLS = 64  # of majorants along an axis
 EVENT_COST = 3.0  # time of an event over that of a cell
 GLOW_EVENTS = 4.0  # least mean number of events over the box where anything glows
-AIMED_CELLS = 32  # along the longest axis, by which points of what glows are chosen
-RAY_POINTS = 2.0  # light samples that a ray through what glows counts for
+AIMED_CELLS = 32  # along the longest axis, by which points of a medium that glows are chosen
+RAY_POINTS = 2.0  # light samples that a ray through a medium that glows counts for
 FAINT = f4(0.1)  # transmittance below which shadow rays are ended at random
 
 
 def _grid(name: str, value: Any, channels: tuple[int, ...] = (), high: float = FLOAT32_MAX) -> Floats:
     """Return a grid (z, y, x, ...) of float32 numbers in [0, `high`]."""
-    given = as_array(name, value)
-    wanted = "(z, y, x" + "".join(f", {each}" for each in channels) + ")"
-    if given.ndim != 3 + len(channels) or given.shape[3:] != channels or not given.size:
-        raise SceneError(f"{name} must be a grid of shape {wanted}, got {given.shape}")
-    if given.dtype.kind not in "fiub":
-        raise SceneError(f"{name} must be numeric, got an array of {given.dtype}")
-    low, most = given.min(), given.max()  # NaN where any is
+    grid = as_array(name, value)
+    wanted = "(z, y, x" + "".join(f", {size}" for size in channels) + ")"
+    if grid.ndim != 3 + len(channels) or grid.shape[3:] != channels or not grid.size:
+        raise SceneError(f"{name} must be a grid of shape {wanted}, got {grid.shape}")
+    if grid.dtype.kind not in "fiub":
+        raise SceneError(f"{name} must be numeric, got an array of {grid.dtype}")
+    low, most = grid.min(), grid.max()  # NaN where any is
     if not (low >= 0 and most <= high):
-        bad = np.argwhere(~((given >= 0) & (given <= high)))[0]
+        bad = np.argwhere(~((grid >= 0) & (grid <= high)))[0]
         where = "".join(f"[{i}]" for i in bad)
         limit = f"in [0, {high:g}]" if high < FLOAT32_MAX else "at least 0 and finite"
-        raise SceneError(f"{name}{where} is {given[tuple(bad)]}; it must be {limit}")
-    return np.ascontiguousarray(given, f4)
+        raise SceneError(f"{name}{where} is {grid[tuple(bad)]}; it must be {limit}")
+    return np.ascontiguousarray(grid, f4)
 
 
 def _colors_or(convert: Any, high: float = FLOAT32_MAX) -> Any:
@@ -103,7 +103,7 @@ class GridMedium(BaseMedium):
         Radiance that is emitted per unit of length, as for `Medium`: a color where the density is 1, or a
         grid (z, y, x, 3) of any resolution, whatever the density. With a temperature: a factor, by default 1.
     temperature
-        (z, y, x) kelvin, in the resolution of the density: what absorbs emits as a black body.
+        (z, y, x) kelvin, in the resolution of the density: absorption emits as a black body.
     majorant_cells
         Cells along the longest axis of the coarse grid that bounds the density; it changes the speed and
         the noise, and not the mean. None: chosen by the density.
@@ -152,7 +152,7 @@ class GridMedium(BaseMedium):
             glow = self.emission.astype(np.float64)
         most = FLOAT32_MAX / max(1.0, float(self.density.max()))
         self.sigma_a, self.sigma_s, self.glow = (
-            np.minimum(each * self.scale, most).astype(f4) for each in (absorbed, scattered, glow)
+            np.minimum(sigma * self.scale, most).astype(f4) for sigma in (absorbed, scattered, glow)
         )
         # (z, y, x, 3) emission beside `glow`
         self.glow_grid: Floats | None = grid if grid is not None and grid.any() else None
@@ -231,9 +231,9 @@ class GridMedium(BaseMedium):
         for count in tried:
             if best is not None and count > longest:
                 break
-            cells = tuple(int(each) for each in np.clip(np.rint(sizes * count / longest), 1, sizes))
+            cells = tuple(int(n) for n in np.clip(np.rint(sizes * count / longest), 1, sizes))
             assert len(cells) == 3
-            low, high = (bounds_in_cells(field, cells, each) * unit for each in (np.minimum, np.maximum))
+            low, high = (bounds_in_cells(field, cells, ufunc) * unit for ufunc in (np.minimum, np.maximum))
             if self.glows:
                 shines: Any = 1.0
                 if not self.glow.any() and self.glow_grid is not None:
@@ -255,12 +255,12 @@ class GridMedium(BaseMedium):
             return np.zeros((1, 1, 1), f4), 1.0
         density = self.density if self.density.ndim == 4 else self.density[..., None]
         sizes = np.maximum(density.shape[:3], glow.shape[:3])
-        cells = tuple(int(each) for each in np.clip(np.rint(sizes * AIMED_CELLS / sizes.max()), 1, sizes))
+        cells = tuple(int(n) for n in np.clip(np.rint(sizes * AIMED_CELLS / sizes.max()), 1, sizes))
         assert len(cells) == 3
         total = np.zeros(cells)
         for field in ((density * self.glow[:, 0].astype(np.float64)).mean(-1), glow.mean(-1)):
-            parts = [bounds_in_cells(each, cells, np.add) for each in (field, np.ones(field.shape))]
-            total += parts[0] / parts[1]
+            sums = [bounds_in_cells(values, cells, np.add) for values in (field, np.ones(field.shape))]
+            total += sums[0] / sums[1]
         share = total / total.sum()
         volume = abs(np.linalg.det(self.transform[:3, :3])) / share.size
         rate = RAY_POINTS / float((volume / (share**2).sum()) ** (1 / 3))
@@ -282,7 +282,7 @@ class GridMedia(MediumRecord):
     scattering: Floats  # (3, k)
     shine: Floats  # (3, k) emission
     aim: Voxels  # density of light samples in coarse cells, per volume, over `points_on_ray`
-    points_on_ray: Floats  # (k,) per scene unit, light samples that a ray through what glows counts for
+    points_on_ray: Floats  # (k,) per scene unit, light samples that a ray through a glowing medium counts for
     scatters: Bools  # (k,)
     glows: Bools  # (k,)
 
@@ -311,7 +311,7 @@ class GridMedia(MediumRecord):
             lanes, inside = march.advance(rate)
             row, column, rate = march.row.take(lanes), march.number.take(lanes), rate.take(lanes)
             point, chance = march.points(lanes), march.draw(lanes, step)
-            part = take(weight, row)
+            beta = take(weight, row)
             density = self.density.at(column, point)
             if light is not None:
                 glow = self.emission(column, point, density) / rate
@@ -319,18 +319,18 @@ class GridMedia(MediumRecord):
                     away = weights.before.take(row) + march.entry.take(lanes) + march.t.take(lanes)
                     rival = weights.ratio.take(row) * self.aim.cell_at(column, point) * (away * away)
                     glow = glow / (f4(1) + rival * rival)  # the power heuristic
-                light[:, row] += part * glow
+                light[:, row] += beta * glow
             met = np.minimum(take(self.extinction, column) * density / rate, f4(1))
             scatters = self.scatters.take(column)
-            ends = dot(channel_shares(take(throughput, row) * part), met) * scatters
+            ends = dot(channel_shares(take(throughput, row) * beta), met) * scatters
             real = chance < ends
             scattered = take(self.scattering, column) * self.albedo.at(column, point) * (density / rate)
-            part *= np.where(real, scattered / np.maximum(ends, TINY), (f4(1) - met) / (f4(1) - ends * ~real))
-            part = np.where(scatters, part, survivors(part, chance))
-            weight[:, row] = part
+            beta *= np.where(real, scattered / np.maximum(ends, TINY), (f4(1) - met) / (f4(1) - ends * ~real))
+            beta = np.where(scatters, beta, survivors(beta, chance))
+            weight[:, row] = beta
             hit = lanes.compress(real)
             distance[row.compress(real)] = march.entry.take(hit) + march.t.take(hit)
-            inside[lanes] = ~real & (highest(part) > 0)
+            inside[lanes] = ~real & (highest(beta) > 0)
             march, step = march if inside.all() else march.take(np.flatnonzero(inside)), step + 1
         return Flight(distance, weight, light)
 
@@ -342,7 +342,7 @@ class GridMedia(MediumRecord):
         cell as the control.
         """
         assert rays.steps is not None
-        part, control = np.ones_like(rays.direction), np.zeros_like(rays.length)
+        estimate, control = np.ones_like(rays.direction), np.zeros_like(rays.length)
         strongest = np.maximum(highest(self.extinction), TINY)
         first = optical_depth(rays.steps.draw(0))
         march = self._march(replace(rays, steps=rays.steps.again()), first)
@@ -356,19 +356,19 @@ class GridMedia(MediumRecord):
             chance = march.draw(lanes, step)
             rest = self.density.at(column, march.points(lanes)) * most - low.take(lanes)
             rest = np.minimum(np.maximum(rest / rate.take(lanes), f4(0)), f4(1))
-            left = take(part, row) * (f4(1) - rest * (take(self.extinction, column) / most))
+            left = take(estimate, row) * (f4(1) - rest * (take(self.extinction, column) / most))
             left = survivors(left, chance)
-            part[:, row] = left
+            estimate[:, row] = left
             inside[lanes] = highest(left) > 0
             if not inside.all():
                 gone = np.flatnonzero(~inside)
                 control[march.row.take(gone)] = march.control.take(gone)
                 march = march.take(np.flatnonzero(inside))
             step += 1
-        return part * exp(-control * take(self.extinction / strongest, rays.number))
+        return estimate * exp(-control * take(self.extinction / strongest, rays.number))
 
     def emission(self, number: Ints, point: Floats, density: Floats) -> Floats:
-        """Return what is emitted per scene unit, (3, n), at points (3, n) of the unit cube."""
+        """Return the emission per scene unit, (3, n), at points (3, n) of the unit cube."""
         return take(self.shine, number) * density + self.glow.at(number, point)
 
     def _march(self, rays: MediumRays, left: Floats) -> March:
@@ -382,7 +382,7 @@ class GridMedia(MediumRecord):
         return March.of(inside, self.bounds.size, self.bounds.first, left)
 
 
-def survivors(part: Floats, u: Floats) -> Floats:
+def survivors(weight: Floats, u: Floats) -> Floats:
     """Return weights (3, n), of which faint ones become 0 or more with u (n,): their means stay."""
-    chance = np.minimum(highest(part) / FAINT, f4(1))
-    return np.where(u < chance, part / np.maximum(chance, TINY), f4(0))
+    chance = np.minimum(highest(weight) / FAINT, f4(1))
+    return np.where(u < chance, weight / np.maximum(chance, TINY), f4(0))

@@ -105,8 +105,8 @@ class Medium(BaseMedium):
             absorbed = extinction - scattered
         self.sigma_a, self.sigma_s, self.glow = (
             # no float32 is so large that it would make a path of length 0 a NaN
-            np.minimum(each * self.scale, FLOAT32_MAX).astype(f4)
-            for each in (absorbed, scattered, self.emission.astype(np.float64))
+            np.minimum(sigma * self.scale, FLOAT32_MAX).astype(f4)
+            for sigma in (absorbed, scattered, self.emission.astype(np.float64))
         )
         self.scatters, self.glows = bool(self.sigma_s.any()), bool(self.glow.any())
 
@@ -139,7 +139,7 @@ class HomogeneousMedia(MediumRecord):
         Sources: M. Pharr, W. Jakob and G. Humphreys, *Physically Based Rendering*, 3rd edition, §15.2.1 (the
         mean of the channels' densities); A. Wilkie et al., "Hero Wavelength Spectral Sampling", EGSR 2014.
         """
-        extinction, scattering = (take(each, rays.number) for each in (self.extinction, self.scattering))
+        extinction, scattering = (take(sigma, rays.number) for sigma in (self.extinction, self.scattering))
         shares = channel_shares(throughput)
         chosen = chosen_channel(extinction, shares, u[0])
         # where nothing is scattered, nothing is chosen either
@@ -159,15 +159,15 @@ class HomogeneousMedia(MediumRecord):
         return transmitted(take(self.extinction, rays.number), rays.length)
 
     def _emitted(self, rays: MediumRays, extinction: Floats) -> Floats:
-        """Return ε(1 − exp(−σt·length))/σt, (3, n): what is emitted on the way to the end of the rays."""
+        """Return ε(1 − exp(−σt·length))/σt, (3, n): the emission on the way to the end of the rays."""
         glow, length = take(self.glow, rays.number), rays.length
         clear = extinction == 0
         depth = np.where(clear, f4(0), extinction * np.where(clear, f4(0), length))
         thin, low = depth < THIN, np.minimum(depth, THIN)
         series = f4(1) - low * (f4(1 / 2) - low * (f4(1 / 6) - low * f4(1 / 24)))
-        part = series * np.where(thin & (glow > 0), length, f4(0))
+        by_series = series * np.where(thin & (glow > 0), length, f4(0))
         thick = (f4(1) - exp(-depth)) / np.where(clear, f4(1), extinction)
-        return glow * np.where(thin, part, thick)
+        return glow * np.where(thin, by_series, thick)
 
 
 def transmitted(extinction: Floats, length: Floats) -> Floats:

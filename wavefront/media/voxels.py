@@ -36,11 +36,11 @@ class Voxels(SoA):
     @classmethod
     def concatenate(cls, records: Sequence[Self]) -> Self:
         """Return the grids of several records."""
-        ends = np.cumsum([0, *(each.values.shape[1] for each in records)])
-        first = [each.first + end for each, end in zip(records, ends[:-1], strict=True)]
-        channels = max(each.values.shape[0] for each in records)
-        values = [np.broadcast_to(each.values, (channels, each.values.shape[1])) for each in records]
-        size = np.concatenate([each.size for each in records], -1)
+        ends = np.cumsum([0, *(record.values.shape[1] for record in records)])
+        first = [record.first + end for record, end in zip(records, ends[:-1], strict=True)]
+        channels = max(record.values.shape[0] for record in records)
+        values = [np.broadcast_to(record.values, (channels, record.values.shape[1])) for record in records]
+        size = np.concatenate([record.size for record in records], -1)
         return cls(np.concatenate(values, -1), np.concatenate(first), size)
 
     def at(self, number: Ints, point: Floats) -> Floats:
@@ -51,7 +51,7 @@ class Voxels(SoA):
         whole = size.astype(f4)
         x = np.minimum(np.maximum(point * whole - f4(0.5), f4(0)), whole - f4(1))
         low = x.astype(np.intp)
-        part = x - low
+        fraction = x - low
         row, layer = size[0], size[0] * size[1]
         corner = self.first.take(number) + low[0] + row * low[1] + layer * low[2]
         inner = low + 1 < size  # at the last voxel there is no next one, and it has no part
@@ -59,9 +59,9 @@ class Voxels(SoA):
         lines = []
         for at in (corner, corner + along[1], corner + along[2], corner + along[1] + along[2]):
             near = take(self.values, at)
-            lines.append(near + (take(self.values, at + along[0]) - near) * part[0])
-        near = lines[0] + (lines[1] - lines[0]) * part[1]
-        return near + (lines[2] + (lines[3] - lines[2]) * part[1] - near) * part[2]
+            lines.append(near + (take(self.values, at + along[0]) - near) * fraction[0])
+        near = lines[0] + (lines[1] - lines[0]) * fraction[1]
+        return near + (lines[2] + (lines[3] - lines[2]) * fraction[1] - near) * fraction[2]
 
     def cell_at(self, number: Ints, point: Floats) -> Floats:
         """Return the value (n,) of the one channel in the voxels with points (3, n), not interpolated."""

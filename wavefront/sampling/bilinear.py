@@ -24,8 +24,8 @@ def between(nodes: Floats, x: Floats) -> Mix:
         return ALONE
     low = np.clip(np.searchsorted(nodes, x) - 1, 0, len(nodes) - 2)
     start = nodes.take(low)
-    part = np.clip((x - start) / (nodes.take(low + 1) - start), f4(0), f4(1))
-    return (low, f4(1) - part), (low + 1, part)
+    fraction = np.clip((x - start) / (nodes.take(low + 1) - start), f4(0), f4(1))
+    return (low, f4(1) - fraction), (low + 1, fraction)
 
 
 def product(slow: Mix, fast: Mix, count: int) -> Mix:
@@ -145,18 +145,18 @@ def _sums(values: Doubles) -> Doubles:
 
 def _last(edge: Callable[[Ints], Floats], target: Floats, cells: int) -> Ints:
     """Return the last of so many cells (n,) whose first edge is not above the targets (n,), by bisection."""
-    found = np.zeros(len(target), np.intp)
+    cell = np.zeros(len(target), np.intp)
     for bit in range(cells.bit_length() - 1, -1, -1):
-        tried = found + (1 << bit)
+        tried = cell + (1 << bit)
         inside = np.minimum(tried, cells - 1)
-        found = np.where((tried < cells) & (edge(inside) <= target), inside, found)
-    return found
+        cell = np.where((tried < cells) & (edge(inside) <= target), inside, cell)
+    return cell
 
 
-def _position(part: Floats, low: Floats, high: Floats) -> Floats:
-    """Return x in [0, 1] up to which a density that runs from `low` to `high` has the integral `part`."""
-    root = low + np.sqrt(np.maximum(low * low + f4(2) * part * (high - low), f4(0)))
-    return np.clip(f4(2) * part / np.where(root > 0, root, f4(1)), f4(0), f4(1))
+def _position(integral: Floats, low: Floats, high: Floats) -> Floats:
+    """Return x in [0, 1] up to which a density that runs from `low` to `high` has the integral `integral`."""
+    root = low + np.sqrt(np.maximum(low * low + f4(2) * integral * (high - low), f4(0)))
+    return np.clip(f4(2) * integral / np.where(root > 0, root, f4(1)), f4(0), f4(1))
 
 
 def _part(x: Floats, low: Floats, high: Floats) -> Floats:

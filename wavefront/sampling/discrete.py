@@ -60,12 +60,12 @@ class Inversion:
         edge = np.zeros((rows, self.items + 1), f4)  # where items begin and end
         first = np.empty((rows, self._cells), np.min_scalar_type(self.items - 1))
         step = max(1, _PART // self.items)
-        for part in (slice(start, start + step) for start in range(0, rows, step)):
-            upto = np.cumsum(weights[part], axis=1, dtype=np.float64)
+        for span in (slice(start, start + step) for start in range(0, rows, step)):
+            upto = np.cumsum(weights[span], axis=1, dtype=np.float64)
             upto /= np.where(upto[:, -1:] > 0, upto[:, -1:], 1)
             # A float32 edge that is rounded up separates float32 numbers exactly as the float64 sum does.
-            edge[part, 1:] = _rounded_up(upto)
-            first[part] = _first_items(edge[part, 1:], self._cells)
+            edge[span, 1:] = _rounded_up(upto)
+            first[span] = _first_items(edge[span, 1:], self._cells)
         self._edge, self._first = edge.ravel(), first.ravel()
 
     def find(self, u: Floats, row: Ints | None = None) -> tuple[Ints, Floats]:

@@ -212,9 +212,9 @@ class BlueNoiseSampler(Sampler):
         row = pixel // width
         place = _every_second_bit(pixel - row * width) | _every_second_bit(row) << u4(1)
         another = _stream(self.seed ^ _GOLDEN, bounce, dimension)
-        own = _sequence(another, _mirror_squares(place, another.words[0]), first)
+        shifts = _sequence(another, _mirror_squares(place, another.words[0]), first)
         out = np.empty((2, len(pixel)), f4)
-        for word, shift, numbers in zip(_points(stream, sample, first, 2), own, out, strict=True):
+        for word, shift, numbers in zip(_points(stream, sample, first, 2), shifts, out, strict=True):
             _fraction(word ^ shift, numbers)
         return out
 
@@ -258,8 +258,8 @@ class Stream:
 def _stream(seed: int, bounce: int, dimension: int) -> Stream:
     """Return the keys of a stream, which depend on every bit of the address."""
     state = _mix64(seed)
-    for part in (bounce, dimension):
-        state = _mix64((state ^ part) + _GOLDEN & _MASK64)
+    for component in (bounce, dimension):
+        state = _mix64((state ^ component) + _GOLDEN & _MASK64)
     keys = [_mix64(state + i * _GOLDEN & _MASK64) for i in range(1, 5)]
     words = [half for key in keys[2:] for half in (u4(key >> 32), u4(key & 0xFFFFFFFF))]
     leader = _stream(seed, 0, Dimension.PIXEL) if bounce == 0 and dimension in WITH_PIXEL else None
@@ -310,7 +310,7 @@ def _mix_again(x: Words, key: np.uint32) -> Words:
 
 
 def _pixel_words(stream: Stream, pixel: Words) -> tuple[Words, Words]:
-    """Return what pixels (n,) XOR to the first coordinate, and which copies they read, (n,) each."""
+    """Return the words (n,) by which pixels XOR the first coordinate, and the copies (n,) that they read."""
     word = _mix_words(pixel, *stream.words[:2])
     first = word if stream.leader is None else _mix_words(pixel, *stream.leader.words[:2])
     return word, first & u4(VARIANTS - 1)
@@ -362,7 +362,7 @@ def _sequence(stream: Stream, sample: Words, variant: Words) -> Words:
     index = _reverse(_owen(_reverse(sample), shuffle))
     # The first coordinate is the reversed index, so two reversals cancel.
     pair = (index, _pascal(index)) if leader is stream else _quaternary(index)
-    x, y = (_reverse(_owen(*each)) for each in zip(pair, (scramble_x, scramble_y), strict=True))
+    x, y = (_reverse(_owen(*arguments)) for arguments in zip(pair, (scramble_x, scramble_y), strict=True))
     return np.stack([x, y])
 
 

@@ -15,7 +15,7 @@ from ..arrays.vec import Floats, cross, dot, f4, normalize
 class SphericalRectangle:
     """Rectangles, each seen from one point, sampled uniformly in solid angle.
 
-    It prepares what a sample and its density share, a column per lane.
+    It prepares the values that a sample and its density share, a column per lane.
 
     In the rectangle's frame, at distance z, the part up to x covers F(x) − F(x₀) with
     F = asin(b₁c) − asin(b₀c), c = x/√(x² + z²), bᵢ = yᵢ/√(yᵢ² + z²); solved for c this is

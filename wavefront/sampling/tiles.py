@@ -1,11 +1,11 @@
-"""Tiles: pixels whose paths share what they find.
+"""Tiles: pixels whose paths share light.
 
 Those of a picture are interleaved. It is divided into blocks of SIDE² cells. Each cell has STRIDE² pixels,
 one of each of the STRIDE² tiles of its block. A hash of block and cell shifts the tiles within the cell, so
 the pixels of a tile lie at irregular distances, and the noise that they share does not repeat. Tiles depend
 on the place in the whole picture alone, and are the same for every sample: a pixel that needs more samples
 needs them together with the others of its tile, in one job. Partners that change from sample to sample would
-lose the stratification of what a pixel gets from the others.
+lose the stratification of the light that a pixel gets from the others.
 
 Sensors at points form tiles of those that lie near each other.
 
@@ -77,8 +77,8 @@ def pixels_of_tiles(place: Ints, across: int) -> tuple[Ints, Ints]:
     """
     block, tile = np.divmod(place[:, None], STRIDE * STRIDE)
     (block_y, block_x), member = np.divmod(block, across), np.arange(MEMBERS)
-    cells = (each.astype(np.uint32) for each in (block_x, block_y, member))
-    shift_x, shift_y = (each.astype(np.intp) for each in cell_shifts(*cells))
+    cells = (numbers.astype(np.uint32) for numbers in (block_x, block_y, member))
+    shift_x, shift_y = (shift.astype(np.intp) for shift in cell_shifts(*cells))
     x = (block_x * SIDE + member % SIDE) * STRIDE + (tile % STRIDE - shift_x) % STRIDE
     y = (block_y * SIDE + member // SIDE) * STRIDE + (tile // STRIDE - shift_y) % STRIDE
     return x, y
@@ -145,7 +145,7 @@ class PointTiles:
     def pixels(self, number: Ints) -> list[Words]:
         """Return the pixels of each of some tiles (k,)."""
         order = np.argsort(self.rank).astype(np.uint32)
-        return [order[MEMBERS * each : MEMBERS * (each + 1)] for each in number.tolist()]
+        return [order[MEMBERS * tile : MEMBERS * (tile + 1)] for tile in number.tolist()]
 
 
 Tiles: TypeAlias = PictureTiles | PointTiles

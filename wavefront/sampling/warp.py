@@ -192,11 +192,11 @@ def linear_with_density(u: Floats, slope: Floats) -> tuple[Floats, Floats]:
 
 def linear_pdf(p: Floats, slope: Floats) -> Floats:
     """Return the density (n,) of `linear` at points p (2, n) of the square."""
-    each = p + p
-    each -= f4(1)
-    each *= slope
-    each += f4(1)
-    return each[0] * each[1]
+    factors = p + p
+    factors -= f4(1)
+    factors *= slope
+    factors += f4(1)
+    return factors[0] * factors[1]
 
 
 def linear_inverse(p: Floats, slope: Floats) -> Floats:
@@ -296,7 +296,7 @@ def windowed_gaussian_inverse(x: Floats, sigma: float = 0.5, radius: float = 2.0
 
 
 def _window(sigma: float, radius: float) -> tuple[Doubles, Doubles]:
-    """Return the edges of cells from -radius to radius, and what is below of `windowed_gaussian`."""
+    """Return the edges of cells from -radius to radius, and the integral of `windowed_gaussian` to them."""
     edges = np.linspace(-radius, radius, CELLS + 1)
     at = np.append((edges[1:] + edges[:-1]) / 2, radius) / sigma
     height = exp((-0.5 * at * at).astype(f4)).astype(np.float64)

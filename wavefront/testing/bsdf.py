@@ -184,8 +184,8 @@ def _check_view(
         p = binomial_p(lobe.count, samples, min(1.0, copies * lobe.probability))
         report.significant("delta lobe (binomial)", f"{where}, wi_z {lobe.wi[2]:.4g}", p, alpha)
     singular = min(1.0, sum(lobe.probability for lobe in lobes))
-    kept = pilot.wi[:, (pilot.pdf > 0) & ~pilot.specular]
-    check_density(report, where, CHARTS["sphere"], kept, drawn_points, samples, view.pdf, alpha, singular)
+    pilot_wi = pilot.wi[:, (pilot.pdf > 0) & ~pilot.specular]
+    check_density(report, where, CHARTS["sphere"], pilot_wi, drawn_points, samples, view.pdf, alpha, singular)
 
 
 def chunk_sizes(n: int) -> Iterator[int]:
@@ -222,7 +222,7 @@ def _check_arrays(report: Report, view: _View, rng: np.random.Generator) -> None
         shape = (row, n) if row else (n,)
         dtype = np.bool_ if name == "specular" else f4
         check_array(report, where, name, whole[k], shape, dtype)
-        joined = np.concatenate([part[k] for part in parts], axis=-1)
+        joined = np.concatenate([piece[k] for piece in parts], axis=-1)
         report.holds("lanes independent", f"{where}, {name}", joined != whole[k], "the same bits")
     for k, (plain, joint) in enumerate(((4, 6), (5, 7))):
         error = np.abs(whole[plain] - whole[joint]) / np.maximum(np.abs(whole[plain]), 1e-20)
@@ -294,11 +294,13 @@ def _check_samples(report: Report, view: _View, drawn: BsdfSample) -> None:
         return
     wi = np.ascontiguousarray(drawn.wi[:, lanes])
     f, pdf = view.f(wi).astype(np.float64), view.pdf(wi).astype(np.float64)
-    weight, kept = drawn.weight[:, lanes], drawn.pdf[lanes]
-    error = np.abs(kept / np.maximum(pdf, 1e-300) - 1)
+    weight, drawn_pdf = drawn.weight[:, lanes], drawn.pdf[lanes]
+    error = np.abs(drawn_pdf / np.maximum(pdf, 1e-300) - 1)
     k = int(np.argmax(error))
-    report.near("sample pdf / pdf()", f"{where}, {_text(wi[:, k])}", kept[k] / max(pdf[k], 1e-300), 1.0, 1e-5)
-    exact = f * np.abs(wi[2].astype(np.float64)) / kept
+    report.near(
+        "sample pdf / pdf()", f"{where}, {_text(wi[:, k])}", drawn_pdf[k] / max(pdf[k], 1e-300), 1.0, 1e-5
+    )
+    exact = f * np.abs(wi[2].astype(np.float64)) / drawn_pdf
     scale = np.maximum(exact.max(0), 1e-20)
     error = np.abs(weight - exact) / scale
     c, k = divmod(int(np.argmax(error)), error.shape[1])
@@ -361,12 +363,12 @@ def _check_reciprocity(report: Report, view: _View, rng: np.random.Generator) ->
     """Check that exchanging wo and wi changes f only by the square of the relative index."""
     drawn = view.sample(rng.random((view.bsdf.dimensions, PAIRS), f4))
     eta = np.ones_like(drawn.pdf) if drawn.eta is None else drawn.eta
-    kept = np.flatnonzero((drawn.pdf > 0) & ~drawn.specular & (np.abs(drawn.wi[2]) > 1e-3))
+    lanes = np.flatnonzero((drawn.pdf > 0) & ~drawn.specular & (np.abs(drawn.wi[2]) > 1e-3))
     up = uniform_directions(rng, PAIRS)
     up[2] = np.maximum(np.abs(up[2]), 1e-3)
     up /= np.sqrt((up * up).sum(0))
-    wi = np.concatenate([drawn.wi[:, kept], up], axis=1)
-    eta = np.concatenate([eta[kept], np.ones(PAIRS, f4)])
+    wi = np.concatenate([drawn.wi[:, lanes], up], axis=1)
+    eta = np.concatenate([eta[lanes], np.ones(PAIRS, f4)])
     wo = np.repeat(view.wo, wi.shape[1], 1)
     across = wi[2] < 0
     bound = view.bsdf.bind(_surface(wo, np.full(wi.shape[1], view.back_facing)))

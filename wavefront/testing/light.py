@@ -72,12 +72,12 @@ def check_light(
     columns = min(len(record), 8)
     alpha = 1 - (1 - significance) ** (1 / (columns * len(where)))
     for k in range(columns):
-        one = record.take(np.array([k]))
+        column = record.take(np.array([k]))
         for number, point in enumerate(where):
             rng = np.random.default_rng([seed, k, number])
             name = f"light {k}, point (" + ", ".join(f"{x:.4g}" for x in point) + ")"
             at = (point - center).astype(f4).reshape(3, 1)
-            _check_light_at(report, name, one, at, rng, samples, alpha, compiled)
+            _check_light_at(report, name, column, at, rng, samples, alpha, compiled)
     return report.raise_if_failed()
 
 
@@ -96,9 +96,9 @@ def _check_light_at(
             return light.le(w)
         rays = Rays(np.repeat(point, w.shape[1], 1), w, np.full(w.shape[1], -1, np.intp))
         hits = intersect(compiled, rays)
-        found, out = hits.found, np.zeros_like(w)
-        surface = interaction(compiled, rays.take(found), hits.take(found))
-        out[:, found] = light.le(w.take(found, 1), surface)
+        lanes, out = hits.found, np.zeros_like(w)
+        surface = interaction(compiled, rays.take(lanes), hits.take(lanes))
+        out[:, lanes] = light.le(w.take(lanes, 1), surface)
         return out
 
     def draw(n: int) -> LightSample:
@@ -116,9 +116,9 @@ def _check_light_at(
     if light.delta:
         return
     pilot = draw(PILOT)
-    kept = pilot.wi[:, pilot.pdf > 0]
+    pilot_wi = pilot.wi[:, pilot.pdf > 0]
     joined = np.concatenate(points, axis=1)
-    check_density(report, where, CHARTS["sphere"], kept, joined, samples, density, alpha)
+    check_density(report, where, CHARTS["sphere"], pilot_wi, joined, samples, density, alpha)
 
 
 def _check_arrays(

@@ -55,14 +55,16 @@ def assert_same_picture(
     """
     limit = number("p", p, lambda x: 0 < x < 1, "above 0 and below 1")
     samples = _samples(a), _samples(b)
-    found = compare(*samples)
-    if found.p_value is None:
-        raise SceneError(f"the pictures cannot be compared by their samples: {found.p_absent}")
-    if found.p_value < limit:
-        denoised = any(each.metadata.get(BEFORE_DENOISING) for each in samples if isinstance(each, Image))
+    comparison = compare(*samples)
+    if comparison.p_value is None:
+        raise SceneError(f"the pictures cannot be compared by their samples: {comparison.p_absent}")
+    if comparison.p_value < limit:
+        denoised = any(image.metadata.get(BEFORE_DENOISING) for image in samples if isinstance(image, Image))
         what = "samples of the pictures, before denoising," if denoised else "pictures"
-        raise AssertionError(f"the {what} differ by more than noise, most at {_most(found)}:\n{found}")
-    return found
+        raise AssertionError(
+            f"the {what} differ by more than noise, most at {_most(comparison)}:\n{comparison}"
+        )
+    return comparison
 
 
 def _samples(picture: Any) -> Any:
@@ -73,9 +75,9 @@ def _samples(picture: Any) -> Any:
     return picture if noisy is None else noisy
 
 
-def _most(found: Comparison) -> str:
+def _most(comparison: Comparison) -> str:
     """Return the part of the picture whose mean differs most."""
-    sums = np.asarray(found.difference.rgb, np.float64).sum(2)
+    sums = np.asarray(comparison.difference.rgb, np.float64).sum(2)
     height, width = sums.shape
     for axis in (0, 1):
         sums = np.add.reduceat(sums, np.arange(0, sums.shape[axis], SIDE), axis=axis)

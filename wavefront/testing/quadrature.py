@@ -121,18 +121,18 @@ class DensityIntegrator:
         out, peak = np.empty(boxes.shape[1]), np.empty(boxes.shape[1])
         across, edge = np.empty(boxes.shape[1], np.bool_), np.zeros(boxes.shape[1])
         for start in range(0, len(out), 4096):
-            part = slice(start, start + 4096)
-            a = a0[part, None] + (a1 - a0)[part, None] * NODES
-            b = b0[part, None] + (b1 - b0)[part, None] * NODES
+            span = slice(start, start + 4096)
+            a = a0[span, None] + (a1 - a0)[span, None] * NODES
+            b = b0[span, None] + (b1 - b0)[span, None] * NODES
             p = np.stack([np.repeat(a, 5, 1).ravel(), np.tile(b, 5).ravel()])
             values = self.density(self.chart.to_points(p)).astype(np.float64).reshape(-1, 5, 5)
-            area = ((a1 - a0) * (b1 - b0))[part] * self.chart.area
-            out[part] = ((values @ WEIGHTS) @ WEIGHTS) * area
-            peak[part] = values.max((1, 2))
+            area = ((a1 - a0) * (b1 - b0))[span] * self.chart.area
+            out[span] = ((values @ WEIGHTS) @ WEIGHTS) * area
+            peak[span] = values.max((1, 2))
             along_a, along_b = (np.abs(np.diff(values, axis=k)).sum((1, 2)) for k in (1, 2))
-            across[part] = along_a >= along_b
-            beyond = (values <= 1e-3 * peak[part, None, None]).any((1, 2))  # a broad lobe may be there, too
-            edge[part] = np.where(beyond, 0.02 * peak[part] * area, 0)
+            across[span] = along_a >= along_b
+            beyond = (values <= 1e-3 * peak[span, None, None]).any((1, 2))  # a broad lobe may be there, too
+            edge[span] = np.where(beyond, 0.02 * peak[span] * area, 0)
         return out, peak, across, edge
 
     def _highest(self, home: Ints, boxes: int) -> Doubles:

@@ -1,4 +1,4 @@
-"""A loop that calls a function becomes a generator of what it gives to it."""
+"""A loop that calls a function becomes a generator of the arguments of that function."""
 
 from __future__ import annotations
 
@@ -16,16 +16,16 @@ class _Dropped(BaseException):
 
 
 def in_turns(loop: Callable[[Callable[[T], None]], None]) -> Generator[T, None, None]:
-    """Yield what a loop gives to the function that it is called with.
+    """Yield the objects that a loop gives to the function that it is called with.
 
-    The loop runs in a thread of its own, and waits while the caller looks at what it gave. It ends where the
+    The loop runs in a thread of its own, and waits while the caller looks at each. It ends where the
     generator is closed.
     """
-    turn, given = Semaphore(0), SimpleQueue[Any]()
+    turn, queue = Semaphore(0), SimpleQueue[Any]()
     dropped = False
 
     def give(thing: T) -> None:
-        given.put((thing, None))
+        queue.put((thing, None))
         turn.acquire()
         if dropped:
             raise _Dropped
@@ -35,16 +35,16 @@ def in_turns(loop: Callable[[Callable[[T], None]], None]) -> Generator[T, None, 
         try:
             if not dropped:
                 loop(give)
-            given.put(None)
+            queue.put(None)
         except BaseException as error:
-            given.put((None, error))
+            queue.put((None, error))
 
     thread = Thread(target=Context().run, args=(run,), daemon=True)
     thread.start()
     try:
         while True:
             turn.release()
-            item = given.get()
+            item = queue.get()
             if item is None:
                 return
             thing, error = item

@@ -66,7 +66,7 @@ class Vertex:
     point: Doubles | None  # (3,); None where the path has left the scene
     shape: str  # name; "" where there is none
     material: str
-    throughput: Doubles  # (3,) of the path as it arrives, with what media on the way have left
+    throughput: Doubles  # (3,) of the path as it arrives, weakened by media on the way
     wo: Doubles  # (3,) unit, back along the path
     emitted: LightFound | None = None  # light that the ray has met
     sampled: LightFound | None = None  # the light sample
@@ -82,10 +82,10 @@ class Vertex:
     def light(self) -> Doubles:
         """Light that the vertex adds to the pixel, (3,)."""
         total = np.zeros(3)
-        for found in (self.emitted, self.sampled):
-            if found is not None:
-                part = found.throughput * found.radiance * found.weight
-                total += part if found.f is None else part * found.f * found.cos / found.pdf_light
+        for light in (self.emitted, self.sampled):
+            if light is not None:
+                added = light.throughput * light.radiance * light.weight
+                total += added if light.f is None else added * light.f * light.cos / light.pdf_light
         return total
 
 
@@ -187,7 +187,7 @@ HEADINGS = ("", "shape", "material", "throughput", "light", "f", "cos", "pdf", "
 
 
 def _row(number: int, vertex: Vertex) -> tuple[str, ...]:
-    weights = [f"{each.weight:.3g}" for each in (vertex.emitted, vertex.sampled) if each is not None]
+    weights = [f"{light.weight:.3g}" for light in (vertex.emitted, vertex.sampled) if light is not None]
     delta = "delta" if vertex.specular else ""
     return (
         str(number),
@@ -323,9 +323,9 @@ class VertexRecorder(PathRecorder):
         )
 
     def vertices(self, pixel: tuple[int, int], sample: int, radiance: Floats) -> PathVertices:
-        """Return what has been noted."""
+        """Return the vertices that have been noted."""
         return PathVertices(
-            [Vertex(**each) for each in self._seen],
+            [Vertex(**fields) for fields in self._seen],
             pixel,
             sample,
             radiance.astype(np.float64),

@@ -83,12 +83,12 @@ class Step:
         return f"<Step {self.stage!r}, bounce {self.bounce}: {len(self._paths)} paths>"
 
     def _repr_html_(self) -> str:
-        records = (each for each in (self.paths, self.hits, self.surface) if each is not None)
-        return f"<p>{self.stage}, bounce {self.bounce}</p>" + "".join(each._repr_html_() for each in records)
+        records = (soa for soa in (self.paths, self.hits, self.surface) if soa is not None)
+        return f"<p>{self.stage}, bounce {self.bounce}</p>" + "".join(soa._repr_html_() for soa in records)
 
 
 def in_world(scene: CompiledScene, record: Record) -> Record:
-    """Return a record in the user's coordinates, read-only; what is the same there is not copied."""
+    """Return a record in the user's coordinates, read-only; arrays that are the same there are not copied."""
     changed: dict[str, Any] = {}
     for name, value in record._values():
         if not isinstance(value, np.ndarray):

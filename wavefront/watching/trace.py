@@ -77,9 +77,9 @@ def trace(
     <Step 'compact', bounce 1: 0 paths>
     <Step 'end', bounce 1: 0 paths>
     """
-    given: dict[str, Any] = {} if max_bounces is None else {"max_bounces": max_bounces}
-    given |= {} if shutter is None else {"shutter": shutter}
-    wave = Wave(scene, size=size, seed=seed, integrator=integrator, **given)
+    options: dict[str, Any] = {} if max_bounces is None else {"max_bounces": max_bounces}
+    options |= {} if shutter is None else {"shutter": shutter}
+    wave = Wave(scene, size=size, seed=seed, integrator=integrator, **options)
     at = number("trace: sample", sample, lambda x: 0 <= x < 1 << 32 and x == int(x), "an integer in [0, 2³²)")
     return Trace(wave, wave.numbers(pixels), int(at))
 
@@ -194,8 +194,8 @@ class Onlooker(PathRecorder):
     def record_hits(self, leg: Leg) -> None:
         """Show the paths that go on."""
         self._light, self._paths = leg.L, leg.kept_paths
-        kept = replace(leg.kept_paths, throughput=leg.kept_paths.throughput.copy())  # it is weakened in place
-        self._give(Step("compact", leg.bounce, leg.scene, leg.L, kept, leg.kept_hits))
+        paths = replace(leg.kept_paths, throughput=leg.kept_paths.throughput.copy())  # weakened in place
+        self._give(Step("compact", leg.bounce, leg.scene, leg.L, paths, leg.kept_hits))
 
     def record_surfaces(self, scene: CompiledScene, paths: Paths, shade: Shading) -> None:
         """Show surfaces that are ready to be shaded."""

@@ -132,7 +132,7 @@ class WarningsOfJobs:
         self._said: set[str] = set()
 
     def repeat(self, messages: Iterable[str]) -> None:
-        """Warn of what has not been said yet."""
+        """Warn with each message that is new."""
         for message in messages:
             if message not in self._said:
                 self._said.add(message)
@@ -295,7 +295,7 @@ def _dask(client: DaskClient, work: StoppableWork, count: int, strict: bool) -> 
 
 
 def _workers_maker(executor: ExecutorLike) -> WorkersMaker:
-    """Return what starts the workers of an executor that a user gives."""
+    """Return the function that starts the workers of an executor that a user gives."""
     if isinstance(executor, DaskClient):
         return partial(_dask, executor)
     if isinstance(executor, Executor):
@@ -366,7 +366,7 @@ def threads_in(client: DaskClient) -> int:
 
 
 def choose_executor(executor: str | ExecutorLike | None, workers: int, paths: int) -> str | ExecutorLike:
-    """Return what was asked for, else "threads" or "processes", whichever is faster for these paths.
+    """Return the executor that was asked for, else "threads" or "processes", the faster one for these paths.
 
     Warns where it were processes, but the system has no semaphores for them.
 
@@ -401,7 +401,7 @@ def _other_threads_compute() -> bool:
     Its own threads do no harm where nobody uses them, as in the 0.1 s for which they spin after a render.
     A thread is busy if it used a core meanwhile, or waits for one that other programs keep from it.
     """
-    others = {each.native_id for each in threading.enumerate() if each.native_id is not None}
+    others = {thread.native_id for thread in threading.enumerate() if thread.native_id is not None}
     others.discard(threading.get_native_id())
     if not others:
         return False
@@ -422,11 +422,11 @@ def _runnable(thread: int) -> bool:
 
 def _seconds(clocks: Iterable[int]) -> dict[int, float]:
     """Return the seconds of clocks by their ids, but for those of threads that have ended."""
-    found = {}
+    seconds = {}
     for clock in clocks:
         with suppress(OSError):
-            found[clock] = time.clock_gettime(clock)
-    return found
+            seconds[clock] = time.clock_gettime(clock)
+    return seconds
 
 
 def waves_per_job(executor: str | ExecutorLike) -> int:

@@ -1,4 +1,4 @@
-"""What workers need of the machine: one thread of BLAS, a heap that is kept; and what bits depend on."""
+"""The machine of workers: one thread of BLAS, a heap that is kept; and the libraries that bits depend on."""
 
 from __future__ import annotations
 
@@ -26,8 +26,8 @@ LARGE = 512  # rows of matrices whose product takes some milliseconds, so that t
 class _SingleThreadedBlas:
     """Holds BLAS to one thread for as long as anybody needs that.
 
-    The number of BLAS's threads is one for the whole process. With a limit for each render, that of two
-    overlapping ones that ends last would restore what it had found, which is the other's limit.
+    The number of BLAS's threads is one for the whole process. With a limit for each render, the one
+    of two overlapping renders that ends last would restore the other's limit.
     """
 
     def __init__(self) -> None:
@@ -69,8 +69,8 @@ def _let_any_thread_set(libraries: Any) -> None:
     From 3.8 on threadpoolctl lets only that thread do so which did first, and nothing happens where others
     try. But renders are ended by threads of their own.
     """
-    for each in libraries.lib_controllers:
-        clear = getattr(each, "clear_controlling_thread", None)
+    for library in libraries.lib_controllers:
+        clear = getattr(library, "clear_controlling_thread", None)
         if clear is not None:
             clear(force=True)
 
@@ -114,12 +114,12 @@ BLOCKS = 3  # of that size that are kept: a wave of shared paths takes nearly as
 
 
 def prepare_heap() -> None:
-    """Have glibc keep what is freed, in large pages; with another C library, do nothing of use.
+    """Have glibc keep freed memory, in large pages; with another C library, do nothing of use.
 
     All memory of a young process is new, and the system hands it out page by page: 11 600 page faults
-    in the first wave. So the heap is grown to what glibc keeps before it gives any back, and NumPy asks for
-    large pages under large arrays. The limits are set since environments may say otherwise: workers of
-    Dask are started with MALLOC_TRIM_THRESHOLD_=65536, and every wave got all of its memory anew, which took
+    in the first wave. So the heap is grown to the size that glibc keeps before it gives any back, and NumPy
+    asks for large pages under large arrays. The limits are set since environments may say otherwise: workers
+    of Dask are started with MALLOC_TRIM_THRESHOLD_=65536, and every wave got all of its memory anew: it took
     twice the time.
     """
     with suppress(AttributeError, OSError, TypeError):  # another C library
@@ -132,7 +132,7 @@ def prepare_heap() -> None:
 
 
 def trim_heap() -> None:
-    """Have glibc give back to the system what is free; with another C library, do nothing."""
+    """Have glibc give free memory back to the system; with another C library, do nothing."""
     with suppress(AttributeError, OSError, TypeError):
         ctypes.CDLL(None).malloc_trim(0)
 
@@ -141,7 +141,7 @@ NONE = "none"
 
 
 def describe_machine() -> dict[str, str]:
-    """Return, by name, what the bits of results of this process depend on."""
+    """Return the properties, by name, that the bits of results of this process depend on."""
     described = {
         "wavefront": VERSION,
         "NumPy": np.__version__,
@@ -154,7 +154,7 @@ def describe_machine() -> dict[str, str]:
 
 
 def machine_differences(here: dict[str, str]) -> tuple[str, ...]:
-    """Return in what this process differs from the machine that was described, in words."""
+    """Return the differences of this process from the machine that was described, in words."""
     there = describe_machine()
     if "embreex" in here and "embreex" not in there:
         there["embreex"] = _embreex_version()

@@ -53,7 +53,7 @@ class WorkerPool(Generic[Job, Result]):
     count
         Number of workers.
     executor
-        A name in `EXECUTORS`, or what that table takes in place of one.
+        A name in `EXECUTORS`, or an object that this table takes in place of one.
     stop
         The stop flag. At STOP no job is begun any more, and work that checks the flag may raise `Stopped`;
         at AT_ONCE nobody waits for jobs under way. `close` sets it to STOP.
@@ -158,7 +158,7 @@ class WorkerPool(Generic[Job, Result]):
         The stop flag is 0 afterwards, unless it is AT_ONCE.
         """
         with self._lock:
-            futures = [each.future for each in self._running]
+            futures = [submitted.future for submitted in self._running]
             self._running.clear()
         self._stop.rise_to(STOP)
         if not all_done(futures, CANCEL_TIMEOUT, self._stop):
@@ -169,12 +169,12 @@ class WorkerPool(Generic[Job, Result]):
     def discard(self) -> None:
         """Wait for the jobs under way, but for those that have not begun, and discard their results."""
         with self._lock:
-            futures = [each.future for each in self._running]
+            futures = [submitted.future for submitted in self._running]
             self._running.clear()
         all_done(futures, math.inf, self._stop)
 
     def _first(self, waiting: Callable[[], object]) -> tuple[Job, Result]:
-        """Wait for the first of the jobs under way; what lost workers had is given to others."""
+        """Wait for the first of the jobs under way; those of lost workers are given to others."""
         while True:
             first = self._running[0]
             while not wait_for_futures([first.future], POLL_INTERVAL).done:
@@ -212,8 +212,8 @@ class WorkerPool(Generic[Job, Result]):
         with self._lock:
             again = list(self._running)
             self._end_workers()
-            for each in again:
-                self._submit(each.job, each.attempt)
+            for submitted in again:
+                self._submit(submitted.job, submitted.attempt)
 
     def _repeat(self, first: _Submitted[Job, Result], failure: JobFailed) -> None:
         """Give the first job to another worker; it stays the first."""
@@ -250,7 +250,7 @@ class WorkerPool(Generic[Job, Result]):
         """End all workers; `running` are the futures that may not be done, by default those under way."""
         with self._lock:
             workers, self._workers = self._workers, None
-            futures = [each.future for each in self._running] if running is None else running
+            futures = [submitted.future for submitted in self._running] if running is None else running
             self._running.clear()
         if workers is None:
             return
@@ -267,7 +267,7 @@ class WorkerPool(Generic[Job, Result]):
         left = IDLE_TIMEOUT
         while not self._closed.wait(left):
             with self._lock:
-                if self._kept or not all(each.future.done() for each in self._running):
+                if self._kept or not all(submitted.future.done() for submitted in self._running):
                     self._last_use = time.monotonic()
                 left = self._last_use + IDLE_TIMEOUT - time.monotonic()
                 if left > 0 and self._workers is not None:

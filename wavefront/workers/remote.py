@@ -44,10 +44,10 @@ class Delivery(Protocol):
     """How the payload reaches workers."""
 
     def first(self, payload: Payload) -> Any:
-        """Return what jobs bring along in place of the payload."""
+        """Return the object that jobs bring along in place of the payload."""
 
     def again(self, payload: Payload) -> Any:
-        """Return what a job brings along that has failed, perhaps because its worker had no payload."""
+        """Return that of a job that has failed, perhaps because its worker had no payload."""
 
 
 class FileDelivery:
@@ -139,7 +139,7 @@ class RemoteWorkers:
         return reply.result
 
     def shutdown(self, running: Collection[Future[Any]]) -> None:
-        """End the workers if they are ours, and remove what was shared with them."""
+        """End the workers if they are ours, and remove the files shared with them."""
         try:
             self._pool.shutdown(running)
         finally:
