@@ -21,7 +21,7 @@ def branch(paths: Paths, shade: Shading, sampler: Sampler, bounce: int, ways: in
     """
     if ways == 1:
         return bounce_sample(paths, shade, sampler, bounce)
-    paths = Paths.concatenate([bounce_sample(each, shade, sampler, bounce) for each in copies(paths, ways)])
+    paths = Paths.concatenate([bounce_sample(way, shade, sampler, bounce) for way in copies(paths, ways)])
     paths.throughput *= f4(1 / ways)
     paths.recorder.branched(ways)
     return paths
@@ -91,12 +91,12 @@ def _strayed(shade: Shading, wi: Floats, cos: Floats) -> Ints:
     """
     if shade.surface.ns is shade.surface.ng:
         return np.zeros(0, np.intp)
-    found = [
+    lanes_of_groups = [
         take(np.arange(cos.size), lanes)[(cos[lanes] == 0) & (wi[2, lanes] != 0)]
         for lanes, bsdf in shade.groups
         if bsdf.transmissive
     ]
-    return np.concatenate(found) if found else np.zeros(0, np.intp)
+    return np.concatenate(lanes_of_groups) if lanes_of_groups else np.zeros(0, np.intp)
 
 
 def _turn(shade: Shading, lanes: Ints, direction: Floats, cos_g: Floats, z: Floats) -> tuple[Floats, Floats]:
@@ -123,11 +123,11 @@ def _sample(shade: Shading, u: Floats) -> BsdfSample:
     )
     assert out.eta is not None
     for lanes, bsdf in shade.groups:
-        part = sampled(bsdf, take(shade.wo, lanes), take(u, lanes))
-        out.wi[:, lanes], out.weight[:, lanes] = part.wi, part.weight
-        out.pdf[lanes], out.specular[lanes] = part.pdf, part.specular
-        if part.eta is not None:
-            out.eta[lanes] = part.eta
+        sample = sampled(bsdf, take(shade.wo, lanes), take(u, lanes))
+        out.wi[:, lanes], out.weight[:, lanes] = sample.wi, sample.weight
+        out.pdf[lanes], out.specular[lanes] = sample.pdf, sample.specular
+        if sample.eta is not None:
+            out.eta[lanes] = sample.eta
     return out
 
 

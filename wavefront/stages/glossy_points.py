@@ -1,6 +1,6 @@
 """Second points of paths whose light depends on the viewer, and that pixels of a tile share all the same.
 
-What is kept of such a point y is what arrives there: by a light sample, and along the direction w in which
+Such a point y keeps the light that arrives there: by a light sample, and along the direction w in which
 the path goes on. The BSDF at y is evaluated anew for each pixel. A light sample does not depend on the pixel,
 and is weighted against the BSDF samples of each as in a path of its own, so emission that a path meets next
 stays its own. The other light L_j that arrives along w counts by the balance heuristic over the pixels that
@@ -26,7 +26,7 @@ from ..compile.scene import CompiledScene
 from ..sampling.sampler import Sampler
 from .shade import Shading, direct
 
-SECTIONS = 3  # columns for each point: light of samples, what stays its own, light along next directions
+SECTIONS = 3  # columns for each point: light of samples, its own light, light along next directions
 
 
 class AllOfIt(Bsdf):
@@ -65,14 +65,14 @@ class GlossyPoints:
         The paths go on in the world directions `onward` (3, g).
         """
         white = replace(shade, groups=[(slice(0, len(paths)), AllOfIt())])
-        found = direct(scene, paths, white, sampler, 1, mis=False, directed=True)
+        arriving = direct(scene, paths, white, sampler, 1, mis=False, directed=True)
         sampled, pdf, light = shade.surface.ns.copy(), np.ones(len(paths), f4), np.zeros(len(paths), np.intp)
-        if found.wi is not None:
-            sampled[:, found.lanes], light[found.lanes] = found.wi, found.light
-            receiver = None if shade.receiver is None else shade.receiver.take(found.lanes)
-            start = take(shade.start, found.lanes)
-            pdf[found.lanes] = scene.lights.pdf_li(found.light, start, found.wi, receiver)
-        return cls(shade, sampled, pdf, light, onward), found
+        if arriving.wi is not None:
+            sampled[:, arriving.lanes], light[arriving.lanes] = arriving.wi, arriving.light
+            receiver = None if shade.receiver is None else shade.receiver.take(arriving.lanes)
+            start = take(shade.start, arriving.lanes)
+            pdf[arriving.lanes] = scene.lights.pdf_li(arriving.light, start, arriving.wi, receiver)
+        return cls(shade, sampled, pdf, light, onward), arriving
 
     def toward(self, which: Ints, wo: Floats | None = None) -> Shading:
         """Return the surfaces of some points (k,) as seen from directions (3, k) or as at first."""

@@ -53,8 +53,8 @@ def mix_with_guide(
     sample, direction
         Those of the mixture.
     gain
-        (n,) density of the mixture over that of the BSDF: throughput times this is what the path would have
-        without a guide. Russian roulette goes by that, since a direction that is drawn often because much
+        (n,) density of the mixture over that of the BSDF: throughput times this is that without
+        a guide. Russian roulette goes by that, since a direction that is drawn often because much
         light comes from there gives a small throughput, and yet is worth following.
     """
     assert shade.guidance is not None

@@ -21,10 +21,10 @@ MOST_SURFACES = 1 << 12  # on the way out of a scene
 
 
 def stacks_at(scene: CompiledScene, origin: Floats, time: Doubles | None = None) -> Any:
-    """Return what points (3, n) are inside of at times (n,), (4, n); None where the scene needs no stacks.
+    """Return the stacks (4, n) of points (3, n) at times (n,); None where the scene needs no stacks.
 
-    A ray leads out of the scene from each: what it leaves without having entered it is around the point, the
-    innermost first.
+    A ray leads out of the scene from each: shapes that it leaves without having entered them are around the
+    point, the innermost first.
     """
     media = scene.media
     if media is None:
@@ -37,8 +37,8 @@ def stacks_at(scene: CompiledScene, origin: Floats, time: Doubles | None = None)
         return stack
     start = take(origin, lanes)
     alike = time is None and bool((start == start[:, :1]).all())  # such as those of a pinhole camera
-    found = _enclosing(scene, start[:, :1] if alike else start, None if time is None else time.take(lanes))
-    stack[:, lanes] = found
+    stacks = _enclosing(scene, start[:, :1] if alike else start, None if time is None else time.take(lanes))
+    stack[:, lanes] = stacks
     return stack
 
 

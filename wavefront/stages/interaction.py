@@ -34,7 +34,7 @@ LIFT = f4(0.01)  # directions below the surface are raised to this cosine with `
 
 
 class Surfaces:
-    """The surfaces that rays have hit. Features with a subclass of it change what they are about."""
+    """The surfaces that rays have hit. Features with a subclass change their data."""
 
     __slots__ = ("hits", "instances", "rays", "scene")
 
@@ -43,13 +43,13 @@ class Surfaces:
         self.instances: InstanceTable | None = None  # of the hits, where any are instances
 
     @classmethod
-    def hits_of(cls, scene: CompiledScene, found: Intersections) -> Hits:
+    def hits_of(cls, scene: CompiledScene, intersections: Intersections) -> Hits:
         """Return the hits that an accelerator has found."""
-        return Hits(found.t, found.prim, None, None)
+        return Hits(intersections.t, intersections.prim, None, None)
 
     @classmethod
     def moment(cls, rays: Rays) -> tuple[Doubles, ...]:
-        """Return what an accelerator is told of rays beside where they go: nothing."""
+        """Return the further arguments of an accelerator for rays, such as times: none."""
         return ()
 
     @classmethod
@@ -116,13 +116,13 @@ def surface_kind(parts: tuple[type[Surfaces], ...]) -> type[Surfaces]:
 
 
 def query(scene: CompiledScene, rays: Rays) -> tuple[Any, ...]:
-    """Return what an accelerator is asked for the nearest hits of rays with."""
+    """Return the arguments of an accelerator for the nearest hits of rays."""
     moment = surface_kind(scene.program.surfaces).moment(rays)
     return rays.origin, rays.direction, rays.exclude_prim, *moment
 
 
 def shadow_query(scene: CompiledScene, rays: Rays, length: Floats) -> tuple[Any, ...]:
-    """Return what an accelerator is asked with whether anything blocks rays over some lengths (n,)."""
+    """Return the arguments of an accelerator for whether anything blocks rays over some lengths (n,)."""
     moment = surface_kind(scene.program.surfaces).moment(rays)
     return rays.origin, rays.direction, length, rays.exclude_prim, *moment
 

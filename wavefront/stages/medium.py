@@ -1,4 +1,4 @@
-"""Rays through media: where light is scattered, and what paths are inside of."""
+"""Rays through media: where light is scattered, and the media around paths."""
 
 from __future__ import annotations
 
@@ -64,7 +64,7 @@ def fly(leg: Leg, lanes: Ints, segment: int) -> Ints:
 
 
 def _glow_weights(scene: CompiledScene, paths: Paths, lanes: Ints, medium: Ints) -> GlowWeights | None:
-    """Return the weights of what media (k,) emit along some lanes (k,); None where all count in full."""
+    """Return the weights of emission by media (k,) along some lanes (k,); None where all count in full."""
     assert scene.media is not None
     light = scene.media.light_of.take(medium)
     sampled = np.flatnonzero((light >= 0) & ~take(paths.specular, lanes))
@@ -89,12 +89,12 @@ def begin_in_media(
     sampler: Sampler,
     bounce: int,
 ) -> None:
-    """Give shadow rays (k) of some lanes of paths what they need in media.
+    """Give shadow rays (k) of some lanes of paths the columns that they need in media.
 
     Parameters
     ----------
     stack
-        (4, n) what rays of all lanes are inside of.
+        (4, n) stacks of the media around rays of all lanes.
     light
         (k,) numbers of the lights that they lead to.
     """
@@ -115,34 +115,34 @@ def dim(part: Floats, scene: CompiledScene, rays: ShadowRays, length: Floats, en
     """
     part *= transmitted(scene, rays, rays.media, length, rays.steps)
     if rays.goal is not None and scene.media is not None:
-        there = (rays.goal < 0) | (scene.media.medium_in(rays.media) == rays.goal)
-        part[:, end & ~there] = 0
+        at_goal = (rays.goal < 0) | (scene.media.medium_in(rays.media) == rays.goal)
+        part[:, end & ~at_goal] = 0
 
 
 def transmitted(
     scene: CompiledScene, rays: Rays, stack: Any, length: Floats, steps: StepNumbers | None
 ) -> Floats:
-    """Return what part of the light media let through over some lengths (n,) of rays, (3, n)."""
+    """Return the transmittance (3, n) of media over some lengths (n,) of rays."""
     media = scene.media
     assert media is not None
-    medium, part = media.medium_in(stack), np.ones_like(rays.direction)
+    medium, passed = media.medium_in(stack), np.ones_like(rays.direction)
     inside = np.flatnonzero(medium >= 0)
     if inside.size:
         some = None if steps is None else steps.take(inside)
-        part[:, inside] = _through(media, rays, inside, medium.take(inside), length.take(inside), some)
-    return part
+        passed[:, inside] = _through(media, rays, inside, medium.take(inside), length.take(inside), some)
+    return passed
 
 
 def _through(
     media: MediaTable, rays: Rays, lanes: Ints, medium: Ints, length: Floats, steps: StepNumbers | None
 ) -> Floats:
-    """Return what part of the light gets over lengths (k,) of some lanes of rays in their media, (3, k)."""
-    part = np.empty((3, lanes.size), f4)
+    """Return the transmittance (3, k) over lengths (k,) of some lanes of rays in their media."""
+    transmittance = np.empty((3, lanes.size), f4)
     for record, rows, column in media.by_record(medium):
         some = None if steps is None else steps.take(rows)
         within = _within(column, rays, lanes.take(rows), length.take(rows), some)
-        part[:, rows] = record.transmittance(within)
-    return part
+        transmittance[:, rows] = record.transmittance(within)
+    return transmittance
 
 
 def _within(column: Ints, rays: Any, lanes: Ints, length: Floats, steps: StepNumbers | None) -> MediumRays:
@@ -165,22 +165,22 @@ def cross(scene: CompiledScene, stack: Any, surface: SurfaceInteraction) -> Any:
 
 
 def crossings(scene: CompiledScene, surface: SurfaceInteraction) -> NDArray[Any]:
-    """Return what crossing surfaces does to stacks, as `MediaTable.crossing`, a row for each surface.
+    """Return the changes of stacks at surfaces, as `MediaTable.crossing`, a row for each surface.
 
     There are two rows, (2, n), where shapes lie on each other, and else one, (1, n).
     """
     media = scene.media
     assert media is not None
-    own = media.crossing(surface.material, surface.back_facing)
+    crossing = media.crossing(surface.material, surface.back_facing)
     if media.touching is None:
-        return own[None]
-    return np.stack([_crossing_of_other(scene, media.touching, surface), own])
+        return crossing[None]
+    return np.stack([_crossing_of_other(scene, media.touching, surface), crossing])
 
 
 def _crossing_of_other(
     scene: CompiledScene, touching: TouchingFaces, surface: SurfaceInteraction
 ) -> NDArray[Any]:
-    """Return what crossing the surfaces of other shapes that lie on these does to stacks, (n,).
+    """Return the changes of stacks (n,) at the surfaces of other shapes that lie on these.
 
     A ray that begins a little before a surface and does not meet it meets the one that lies on it.
     """
@@ -195,15 +195,15 @@ def _crossing_of_other(
     before = f4(4) * here.error / np.maximum(np.abs(dot(here.ng, here.wo)), LEAST_COS)
     start, group, layer = (
         here.point + here.wo * before,
-        *(each.take(number) for each in (touching.group, touching.layer)),
+        *(column.take(number) for column in (touching.group, touching.layer)),
     )
     for of_layer, (members, accelerator) in enumerate(
         zip(touching.members, touching.accelerators, strict=True)
     ):
         some = np.flatnonzero(layer != of_layer)
-        found = accelerator.closest(take(start, some), -take(here.wo, some), np.full(some.size, -1))
-        met = members.take(found.prim)
-        near = (found.prim >= 0) & (found.t < f4(2) * before.take(some))
+        hits = accelerator.closest(take(start, some), -take(here.wo, some), np.full(some.size, -1))
+        met = members.take(hits.prim)
+        near = (hits.prim >= 0) & (hits.t < f4(2) * before.take(some))
         near &= touching.group.take(met) == group.take(some)
         some, met = some.compress(near), met.compress(near)
         opposite = dot(touching.front.take(met, 1), touching.front.take(number.take(some), 1)) < 0

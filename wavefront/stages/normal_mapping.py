@@ -36,11 +36,11 @@ def perturb_normals(scene: CompiledScene, surface: SurfaceInteraction) -> None:
         lanes = np.flatnonzero(normal_map_of == number)
         if not lanes.size:
             continue
-        part = surface.take(lanes)
-        side = np.where(part.back_facing, f4(-1), f4(1))
-        which, normal = normal_map.perturbed(part, part.ns * side)
+        points = surface.take(lanes)
+        side = np.where(points.back_facing, f4(-1), f4(1))
+        which, normal = normal_map.perturbed(points, points.ns * side)
         normal *= side.take(which)
-        wo, ng, smooth = (v.take(which, 1) for v in (part.wo, part.ng, part.ns))
+        wo, ng, smooth = (v.take(which, 1) for v in (points.wo, points.ng, points.ns))
         if normal_map.mirrors_hidden:
             valid = mirror_hidden(wo, smooth, normal)
         else:
@@ -78,8 +78,8 @@ def ensure_valid_reflection(wo: Floats, ng: Floats, smooth: Floats, perturbed: F
     """
     perturbed = face_viewer(wo, perturbed)
     wo_cos = dot(wo, ng)
-    own = f4(2) * dot(smooth, wo) * dot(smooth, ng) - wo_cos
-    least = np.minimum(np.minimum(SHALLOWER * wo_cos, LIFT), own)
+    unmapped = f4(2) * dot(smooth, wo) * dot(smooth, ng) - wo_cos
+    least = np.minimum(np.minimum(SHALLOWER * wo_cos, LIFT), unmapped)
     mirrored = perturbed * (f4(2) * dot(perturbed, wo)) - wo
     missing = least - dot(mirrored, ng)
     low = np.flatnonzero(missing > 0)

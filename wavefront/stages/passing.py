@@ -24,7 +24,7 @@ from .interaction import interaction
 from .intersect import intersect
 from .transmittance import Veils, continue_behind, opacities_at, passable
 
-COVERING = f4(0.5)  # opacity from which on a surface hides what is behind it, where nothing is random
+COVERING = f4(0.5)  # opacity from which on a surface hides those behind it, where nothing is random
 
 
 def pass_through(leg: Leg) -> None:
@@ -83,7 +83,7 @@ def _go_on_behind(leg: Leg, lanes: Ints, veils: Veils, segment: int) -> Ints:
 
 
 def _own_columns(paths: Paths) -> Paths:
-    """Return paths with copies of what changes on their way to the next surface."""
+    """Return paths with copies of the columns that change on their way to the next surface."""
     return replace(
         paths,
         origin=paths.origin.copy(),

@@ -7,8 +7,8 @@ between them, the balance heuristic gives pixel i
 
     Σ_j f_i(y_j) cos_i G_ij V_ij R_j / (branches · Σ_k p_kj)
 
-where G = cos_y / distance² and R_j is the light that leaves y_j. What a pixel finds at points that cannot be
-shared stays its own, and so does what it finds by delta lobes. Whether a point can be shared does not
+where G = cos_y / distance² and R_j is the light that leaves y_j. Light that a pixel finds at points that
+cannot be shared stays its own, and so does light by delta lobes. Whether a point can be shared does not
 depend on which pixel finds it, so the sum of both is unbiased.
 
 Sources: P. Bekaert, M. Sbert and J. Halton, "Accelerating Path Tracing by Re-Using Paths", Eurographics
@@ -49,7 +49,7 @@ from .intersect import ShadowRays, visible
 from .shade import Guidance, Shading
 from .transmittance import transmittance_along
 
-SHARED_WAYS = 2  # in which a path goes on from its shared point: many pixels use what it finds
+SHARED_WAYS = 2  # in which a path goes on from its shared point: many pixels use its light
 TILES_AT_ONCE = (1 << 15) // MEMBERS  # whose first points are connected together, so that they fit the cache
 GRAZING = f4(1 / 16)  # cosine to interpolated normals below which they may have been bent towards the viewer
 
@@ -130,7 +130,7 @@ def add_shared(
     branches: int,
     glossy: GlossyPoints | None = None,
 ) -> None:
-    """Add to all slots what their first points receive from the shared points of their tiles.
+    """Add to all slots the light that their first points receive from the shared points of their tiles.
 
     Parameters
     ----------
@@ -165,14 +165,14 @@ def add_shared(
         if first is None:
             continue
         numbers = [numbers[:, some] for numbers in number_in]
-        found, lost = _arriving(scene, first, points, lights, numbers, glossy)
+        received_here, lost = _arriving(scene, first, points, lights, numbers, glossy)
         for number in filter(len, lost):  # they stay the path's own
             for L, light in sums:
-                own = _leaving(scene, light, number, matte, glossy)
-                L[:, points.slot.take(number)] += take(points.throughput, number) * own
+                leaving = _leaving(scene, light, number, matte, glossy)
+                L[:, points.slot.take(number)] += take(points.throughput, number) * leaving
         cells = np.flatnonzero(first.present)
         lanes = lane_in[:, some].reshape(-1).take(cells)
-        for values, arriving in zip(received, found, strict=True):
+        for values, arriving in zip(received, received_here, strict=True):
             values[:, lanes] = arriving.reshape(3, -1).take(cells, 1)
     for (L, _), values in zip(sums, received, strict=True):
         L[:, slot] += paths.throughput[:, : slot.size] * values
@@ -202,7 +202,7 @@ def _arriving(
     number_in: list[Ints],
     glossy: GlossyPoints | None = None,
 ) -> tuple[list[Floats], list[Ints]]:
-    """Return what the first points of t tiles receive, (3, members, t), and the shared points left out.
+    """Return the light that first points of t tiles receive, (3, members, t), and the shared points left out.
 
     Parameters
     ----------
@@ -220,9 +220,9 @@ def _arriving(
         attenuate(scene, of_rows)
         for (_, number), connections in zip(rows, of_rows, strict=True):
             total = _sum(connections.pdf * connections.geometry)
-            found = total > 0
-            part = connections.geometry / (np.where(found, total, f4(1)) * f4(len(number_in)))
-            weight = connections.f * part
+            connected = total > 0
+            share = connections.geometry / (np.where(connected, total, f4(1)) * f4(len(number_in)))
+            weight = connections.f * share
             if glossy is not None:
                 _add_glossy(
                     scene, first, points, lights, arriving, glossy, number, connections, weight, total
@@ -230,7 +230,7 @@ def _arriving(
                 weight = weight * (number < len(points) - glossy.pdf.size)
             for values, light in zip(arriving, lights, strict=True):
                 values += weight * take(light, number)[:, None]
-            lost.append(number.compress((number >= 0) & ~found))
+            lost.append(number.compress((number >= 0) & ~connected))
     if first.albedo is not None:
         for values in arriving:
             values *= first.albedo
@@ -249,7 +249,7 @@ def _add_glossy(
     weight: Floats,
     total: Floats,
 ) -> None:
-    """Add what first points receive from the glossy ones among the shared points of t tiles, as `_arriving`.
+    """Add the light of the glossy ones among the shared points of t tiles to first points, as `_arriving`.
 
     Parameters
     ----------
@@ -268,17 +268,17 @@ def _add_glossy(
             continue
         cell, which = cells.take(some), at.take(some)
         shade = glossy.toward(which, take(wo, some))
-        part = weight.reshape(-1, t * MEMBERS).take(cell, 1)
+        share = weight.reshape(-1, t * MEMBERS).take(cell, 1)
         if by_samples:
             f, column = glossy.of_samples(scene, which, shade), matte
         else:
             (f, pdf), column = glossy.of_next(which, shade), matte + 2 * g
             joint = np.zeros(t * MEMBERS, f4)
             joint[cell] = (connections.pdf * connections.geometry).reshape(-1).take(cell) * pdf
-            found = _sum(joint.reshape(MEMBERS, t))
-            part *= (total / np.where(found > 0, found, f4(np.inf))).take(cell % t)
+            density = _sum(joint.reshape(MEMBERS, t))
+            share *= (total / np.where(density > 0, density, f4(np.inf))).take(cell % t)
         for values, light in zip(arriving, lights, strict=True):
-            values.reshape(3, -1)[:, cell] += part * f * take(light, which + column)
+            values.reshape(3, -1)[:, cell] += share * f * take(light, which + column)
 
 
 @soa
@@ -297,7 +297,7 @@ class FirstPoints:
     albedo: Floats | None  # (3, members, t) by which f is multiplied in the end
     ng: Floats | None  # (3, ·) unit geometric normals, if they differ from the shading normals
     guidance: Guidance | None
-    # (4, ·) stacks of what the paths that come are inside of, and what crossing does to them, (k, ·)
+    # (4, ·) stacks of the paths that come, and their changes at the surfaces, (k, ·)
     media: Any = None  # None in scenes without a table of media
     crossing: Any = None  # likewise
 
@@ -312,7 +312,7 @@ class FirstPoints:
         albedo
             (3, n) if all are Lambertian.
         media
-            (4, n or more) stacks of what the paths that come are inside of.
+            (4, n or more) stacks of the paths that come.
         """
         present, shape = lane_in >= 0, lane_in.shape
         some = lane_in[present]
@@ -449,25 +449,25 @@ def attenuate(scene: CompiledScene, of_rows: list[Connections]) -> None:
     """Multiply connections, in place, by the transmittance between their points: one query for all."""
     if not of_rows:
         return
-    rays = ShadowRays.concatenate([each.rays for each in of_rows])
-    ends = np.cumsum([each.lanes.size for each in of_rows])[:-1]
+    rays = ShadowRays.concatenate([connections.rays for connections in of_rows])
+    ends = np.cumsum([connections.lanes.size for connections in of_rows])[:-1]
     if scene.media is not None:
         _absorb(of_rows, np.split(transmittance_along(scene, rays), ends, 1))
         return
-    for each, part in zip(of_rows, np.split(_transmittance(scene, rays), ends), strict=True):
-        each.geometry.reshape(-1)[each.lanes] *= part
+    for connections, transmittance in zip(of_rows, np.split(_transmittance(scene, rays), ends), strict=True):
+        connections.geometry.reshape(-1)[connections.lanes] *= transmittance
 
 
 def _absorb(of_rows: list[Connections], parts: list[Floats]) -> None:
-    """Weaken connections, in place, by what media let through, (3, k) each.
+    """Weaken connections, in place, by the transmittance of media, (3, k) each.
 
     Paths get through media that only absorb, so densities do not fall: all that is not blocked counts for
     the weights.
     """
-    for each, part in zip(of_rows, parts, strict=True):
-        each.geometry.reshape(-1)[each.lanes] *= highest(part) > 0
-        each.f = np.repeat(each.f, 3, 0) if len(each.f) == 1 else each.f.copy()
-        each.f.reshape(3, -1)[:, each.lanes] *= part
+    for connections, transmittance in zip(of_rows, parts, strict=True):
+        connections.geometry.reshape(-1)[connections.lanes] *= highest(transmittance) > 0
+        connections.f = np.repeat(connections.f, 3, 0) if len(connections.f) == 1 else connections.f.copy()
+        connections.f.reshape(3, -1)[:, connections.lanes] *= transmittance
 
 
 def _transmittance(scene: CompiledScene, rays: ShadowRays) -> Floats:
@@ -488,7 +488,7 @@ def _sum(values: Floats) -> Floats:
 def can_reuse(scene: CompiledScene) -> bool:
     """Return whether any path of a scene can be shared.
 
-    Where surfaces with alpha and media are mixed none is: what gets through differs between channels then.
+    Where surfaces with alpha and media are mixed none is: transmittance differs between channels then.
     Nor is any where media scatter, or where something moves: each path meets the scene at a time of its own.
     """
     if scene.motion is not None:

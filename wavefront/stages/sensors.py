@@ -1,7 +1,7 @@
 """Sensors: paths that start at points which gather light, as a surface does that was just met.
 
-A sensor is the first vertex of its paths, with a BSDF for which the radiance that leaves it is what it
-measures. So light samples, MIS, guiding and branches hold for it as for any surface.
+A sensor is the first vertex of its paths, with a BSDF for which the radiance that leaves it is the measured
+quantity. So light samples, MIS, guiding and branches hold for it as for any surface.
 
 Source: M. Pharr, W. Jakob and G. Humphreys, Physically Based Rendering, 4th ed. 2023, section 4.1.1
 (irradiance and fluence as integrals of radiance).
@@ -73,7 +73,7 @@ SENSORS = {
 
 
 def sensor_of_camera(camera: Camera) -> SensorBsdf | None:
-    """Return what the pixels of a camera gather light with; None where they show what rays meet."""
+    """Return the sensor of the pixels of a camera; None where they show what rays meet."""
     return SENSORS[camera.sensor] if camera.scatterings and camera.sensor is not None else None
 
 
@@ -106,7 +106,7 @@ class SensorShading(Shading):
         return np.ones_like(local[2]), np.ones_like(local[2])
 
     def albedo(self) -> Floats:
-        """Return by what cosine over π is multiplied, (3, n)."""
+        """Return the factor (3, n) of cosine over π."""
         sensor = self.groups[0][1]
         assert isinstance(sensor, SensorBsdf)
         return np.broadcast_to(sensor.total, self.wo.shape)

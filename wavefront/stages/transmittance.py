@@ -1,4 +1,4 @@
-"""The transmittance of shadow rays through what they may pass, and rays that go on behind surfaces."""
+"""The transmittance of shadow rays through surfaces and media, and rays that go on behind surfaces."""
 
 from __future__ import annotations
 
@@ -27,36 +27,36 @@ def transmittance_along(scene: CompiledScene, rays: ShadowRays, veils: Veils | N
     they may pass; by default, those of shadow rays.
     """
     veils = scene.program.see_through if veils is None else veils
-    part = np.ones_like(rays.direction)
+    transmittance = np.ones_like(rays.direction)
     blocked, perhaps = _blockers(scene, rays, veils)
-    part[:, np.flatnonzero(blocked)] = 0
+    transmittance[:, np.flatnonzero(blocked)] = 0
     seen = ~(blocked | perhaps)
     for dim in scene.program.dim:
         free = np.flatnonzero(seen)
-        some, left = rays.take(free), take(part, free)
+        some, left = rays.take(free), take(transmittance, free)
         dim(left, scene, some, some.distance, np.ones(free.size, np.bool_))
-        part[:, free] = left
+        transmittance[:, free] = left
     lanes = np.flatnonzero(perhaps)
     if not veils:
-        part[:, lanes] = 0
-        return part
+        transmittance[:, lanes] = 0
+        return transmittance
     rays = rays.take(lanes)
     while lanes.size:
         hits = intersect(scene, rays)
         between = hits.t < shadow_ray_length(rays)
         passes = passable(scene, rays, hits, ALL, veils)
-        left = take(part, lanes)
+        left = take(transmittance, lanes)
         left[:, between & ~passes] = 0
         for dim in scene.program.dim:
             dim(left, scene, rays, np.where(between, hits.t, rays.distance), ~between)
-        part[:, lanes] = left
+        transmittance[:, lanes] = left
         met = np.flatnonzero(between & passes)
         lanes, left, rays, hits = lanes.take(met), take(left, met), rays.take(met), hits.take(met)
         passage = Passage(scene, rays, interaction(scene, rays, hits), None, 0)
         left *= f4(1) - opacities_at(passage, veils)
         for weaken in scene.program.weaken:
             weaken(left, hits, passage.surface)
-        part[:, lanes] = left
+        transmittance[:, lanes] = left
         rays = passage.rays = replace(
             continue_behind(rays, passage.surface),
             error=rays.error + passage.surface.error,
@@ -67,11 +67,11 @@ def transmittance_along(scene: CompiledScene, rays: ShadowRays, veils: Veils | N
             cross(passage)
         on = np.flatnonzero(left.max(0) != 0)
         lanes, rays = lanes.take(on), rays.take(on)
-    return part
+    return transmittance
 
 
 def _blockers(scene: CompiledScene, rays: ShadowRays, veils: Veils) -> tuple[Bools, Bools]:
-    """Return which rays (n,) no veil lets pass what they hit, and which others hit anything."""
+    """Return which rays (n,) are blocked whatever the veils, and which others hit anything."""
     if not all(veil.spares_opaque for veil in veils):
         return np.zeros(len(rays), np.bool_), ~visible(scene, rays)
     return surely_occluded(scene.accelerator, *shadow_query(scene, rays, shadow_ray_length(rays)))
@@ -79,10 +79,10 @@ def _blockers(scene: CompiledScene, rays: ShadowRays, veils: Veils) -> tuple[Boo
 
 def passable(scene: CompiledScene, rays: Rays, hits: Hits, lanes: Lanes, veils: Veils) -> Bools:
     """Return whether some lanes (k,) hit surfaces that rays may pass straight on."""
-    found = np.zeros(take(hits.prim, lanes).size, np.bool_)
+    passes = np.zeros(take(hits.prim, lanes).size, np.bool_)
     for veil in veils:
-        found |= veil.passable(scene, rays, hits, lanes)
-    return found
+        passes |= veil.passable(scene, rays, hits, lanes)
+    return passes
 
 
 def opacities_at(passage: Passage, veils: Veils) -> Floats:
