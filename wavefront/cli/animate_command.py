@@ -40,8 +40,8 @@ def add_animate_command(commands: object) -> None:
     command.add_argument("--fps", type=float, default=24.0, help="pictures per second of the file")
     command.add_argument("--start", type=float, help="seconds of the file (default: where it begins to move)")
     command.add_argument("--end", type=float, help="seconds of the file (default: where all motion is over)")
-    part = "part of the time of a picture for which the shutter is open, such as 0.5"
-    command.add_argument("--open", type=float, metavar="PART", help=part)
+    shutter_help = "part of the time of a picture for which the shutter is open, such as 0.5"
+    command.add_argument("--open", type=float, metavar="PART", help=shutter_help)
     command.add_argument(
         "--turntable", type=float, default=0.0, help="degrees by which the view turns meanwhile"
     )
@@ -78,8 +78,8 @@ def _animate(options: argparse.Namespace) -> int:
 
 def _turning(scene: Scene, options: argparse.Namespace, start: float, end: float) -> Scene:
     """Return a scene with a camera, which turns around the middle of all times."""
-    given, degrees = framing(options), number("--turntable", options.turntable)
-    size, view, fov = given["size"], given["view"], given["fov"]
+    view_options, degrees = framing(options), number("--turntable", options.turntable)
+    size, view, fov = view_options["size"], view_options["view"], view_options["fov"]
     camera, _ = choose_camera(scene, None, size, options.up, view, fov, turning=bool(degrees))
     if degrees:
         turn = Turn(scene.vertical(options.up), scene.reach.mean(0), degrees, start, max(start, end))

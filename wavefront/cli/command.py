@@ -25,8 +25,8 @@ class Parser(argparse.ArgumentParser):
         options, unknown = super().parse_known_args(args, namespace)
         if unknown:
             names = [name.lstrip("-").replace("-", "_") for name in self._option_string_actions]
-            found = meant(unknown[0].partition("=")[0].lstrip("-").replace("-", "_"), names)
-            hint = f"; did you mean --{found.replace('_', '-')}?" if found and unknown[0][0] == "-" else ""
+            option = meant(unknown[0].partition("=")[0].lstrip("-").replace("-", "_"), names)
+            hint = f"; did you mean --{option.replace('_', '-')}?" if option and unknown[0][0] == "-" else ""
             self.error(f"unrecognized arguments: {' '.join(unknown)}{hint}")
         return options, []
 

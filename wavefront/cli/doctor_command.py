@@ -130,9 +130,10 @@ def _about_machine() -> Iterator[str]:
     memory = available_memory()
     yield f"  memory: {'unknown' if math.isinf(memory) else f'{memory / 1e9:.1f} GB available'}"
     yield f"  CPU: {machine['architecture']}; NumPy uses {machine['CPU features']}"
-    found = [each for each in threadpool_info() if each.get("user_api") == "blas"]
+    libraries = [library for library in threadpool_info() if library.get("user_api") == "blas"]
     names = [
-        f"{each['internal_api']} {each['version']}, {plural(each['num_threads'], 'thread')}" for each in found
+        f"{library['internal_api']} {library['version']}, {plural(library['num_threads'], 'thread')}"
+        for library in libraries
     ]
     yield f"  BLAS: {'; '.join(names) or 'none found'}"
 
@@ -141,9 +142,9 @@ def _about_extras() -> Iterator[str]:
     yield "Extras"
     for name, extra in EXTRAS.items():
         versions = {package: _version(package) for package in extra.packages}
-        there = ", ".join(f"{package} {found}" for package, found in versions.items() if found)
-        missing = " ".join(package for package, found in versions.items() if not found)
-        state = f"installed ({there})" if not missing else f"not installed: pip install {missing}"
+        installed = ", ".join(f"{package} {version}" for package, version in versions.items() if version)
+        missing = " ".join(package for package, version in versions.items() if not version)
+        state = f"installed ({installed})" if not missing else f"not installed: pip install {missing}"
         yield f"  {name}: {extra.brings}; {state}"
 
 
@@ -183,9 +184,9 @@ def check_furnace() -> CheckResult:
 def check_workers() -> CheckResult:
     """Render one picture with one worker and with two, which must have the same bits."""
     scene = timed_room()
-    one, two = (render(scene, 4, size=(64, 64), workers=n, progress=False) for n in (1, 2))
+    alone, together = (render(scene, 4, size=(64, 64), workers=n, progress=False) for n in (1, 2))
     return CheckResult(
-        "workers", bool(np.array_equal(one.rgb, two.rgb)), "one worker and two give the same bits"
+        "workers", bool(np.array_equal(alone.rgb, together.rgb)), "one worker and two give the same bits"
     )
 
 
@@ -237,7 +238,7 @@ def _ball(rings: int, sides: int) -> tuple[Doubles, Ints]:
     longitude = np.linspace(0, 2 * np.pi, sides, endpoint=False)[None]
     x, y, z = np.sin(latitude) * np.cos(longitude), np.cos(latitude), np.sin(latitude) * np.sin(longitude)
     vertices = np.stack([x, np.broadcast_to(y, x.shape), z], -1).reshape(-1, 3)
-    row, column = (each.ravel() for each in np.mgrid[:rings, :sides])
+    row, column = (indices.ravel() for indices in np.mgrid[:rings, :sides])
     a, b = row * sides + column, row * sides + (column + 1) % sides
     faces = np.concatenate([np.stack([a, b, a + sides], 1), np.stack([b, b + sides, a + sides], 1)])
     return vertices, faces

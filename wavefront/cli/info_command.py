@@ -63,18 +63,17 @@ def _info(options: argparse.Namespace) -> int:
             lines, losses = [_luminaire(path)], list(said)
         else:
             scene = load(path, progress=False if options.quiet else None, **reading(options))
-            lines, losses = list(_lines(path, scene)), [each.said(path) for each in scene.losses]
-    print("\n".join([*lines, f"losses: {len(losses) or 'none'}", *(f"  {each}" for each in losses)]))
+            lines, losses = list(_lines(path, scene)), [loss.said(path) for loss in scene.losses]
+    print("\n".join([*lines, f"losses: {len(losses) or 'none'}", *(f"  {loss}" for loss in losses)]))
     return 0
 
 
 def _luminaire(path: str) -> str:
     """Return the line about a file of a luminaire."""
-    found = parsed_luminaire(*luminaire_texts(path))
-    size = " × ".join(map(str, found.candela.shape))
-    return (
-        f"{path}: luminaire of {Web(found).flux:.4g} lm, at most {found.candela.max():.4g} cd, {size} angles"
-    )
+    photometry = parsed_luminaire(*luminaire_texts(path))
+    size = " × ".join(map(str, photometry.candela.shape))
+    flux, most = Web(photometry).flux, photometry.candela.max()
+    return f"{path}: luminaire of {flux:.4g} lm, at most {most:.4g} cd, {size} angles"
 
 
 def _lines(path: str, scene: Scene) -> Iterator[str]:
@@ -126,11 +125,11 @@ def _textures(thing: Any, seen: set[int]) -> Iterator[Texture]:
     if isinstance(thing, Texture):
         yield thing
     elif isinstance(thing, list | tuple):
-        for part in thing:
-            yield from _textures(part, seen)
+        for element in thing:
+            yield from _textures(element, seen)
     elif type(thing).__module__.startswith(_PACKAGE) and hasattr(thing, "__dict__"):
-        for part in vars(thing).values():
-            yield from _textures(part, seen)
+        for element in vars(thing).values():
+            yield from _textures(element, seen)
 
 
 def _distinct(things: Iterable[Any]) -> list[Any]:
@@ -161,7 +160,7 @@ def _bytes(count: int) -> str:
 
 
 def _axis(path: str, scene: Scene) -> str:
-    """Return what is up, and who says so."""
+    """Return the axis that is up, and the reason."""
     if scene.up is None and os.path.splitext(path)[1].lower() in UNSAID_UP:
         return "y (assumed; up='z' turns it)"
     axis = "xyz"[int(scene.vertical().argmax())]

@@ -54,20 +54,20 @@ def add_measure_command(commands: Any) -> None:
 
 def _grid(text: str) -> tuple[Doubles, Doubles]:
     """Return the points and normals of CORNER:EDGE:EDGE:NxM."""
-    parts = text.split(":")
-    if len(parts) != 4:
+    fields = text.split(":")
+    if len(fields) != 4:
         raise SceneError(f"{text!r} is not CORNER:EDGE:EDGE:NxM, such as 0,0.8,0:0,0,3:4,0,0:8x6")
-    corner, edge_u, edge_v = (vector(part) for part in parts[:3])
-    return grid_points(corner, edge_u, edge_v, size(parts[3]))
+    corner, edge_u, edge_v = (vector(field) for field in fields[:3])
+    return grid_points(corner, edge_u, edge_v, size(fields[3]))
 
 
 def _measure(options: argparse.Namespace) -> int:
     """Measure and save; return the exit status."""
     file_kind(options.output)
     (path,), progress = options.scenes, False if options.quiet else None
-    given = _given_sensors(options)
+    by_options = _given_sensors(options)
     scene = read_scene(path, options, progress)
-    sensors = _sensors_of(path, scene) if given is None else given.above(scene.bounds)
+    sensors = _sensors_of(path, scene) if by_options is None else by_options.above(scene.bounds)
     settings = {**framing(options), **setting_values(options), "progress": progress}
     command = {"arguments": options.arguments, "folder": options.folder}
     spp = settings.pop("spp", None)
@@ -94,15 +94,15 @@ def _sensors_of(path: str, scene: Scene) -> Sensors:
     return scene.camera
 
 
-def _save(found: Measurement, output: str) -> int:
+def _save(measurement: Measurement, output: str) -> int:
     """Save a measurement, if not where it was meant to go then elsewhere; return the exit status."""
     try:
-        found.save(output)
+        measurement.save(output)
     except (SaveError, MemoryError) as error:
         print_error(error)
-        place = save_elsewhere(found.save, output)
+        place = save_elsewhere(measurement.save, output)
         print_note(f"the measurement {f'was saved as {place}' if place else 'is lost'}")
         return ERROR
-    seconds, spp = found.metadata["seconds"], found.metadata["spp"]
-    print_done(f"{output}: {found}, {spp:.4g} spp in {seconds:.1f} s")
+    seconds, spp = measurement.metadata["seconds"], measurement.metadata["spp"]
+    print_done(f"{output}: {measurement}, {spp:.4g} spp in {seconds:.1f} s")
     return 0

@@ -95,7 +95,7 @@ def shutter(text: str) -> tuple[float, float]:
 
 def times(text: str) -> list[float]:
     """Return T,T,... as numbers."""
-    return [_finite(part) for part in text.split(",")]
+    return [_finite(word) for word in text.split(",")]
 
 
 def flow_times(text: str) -> tuple[float, float]:
@@ -213,12 +213,12 @@ def _finite(text: str) -> float:
 def _parts(text: str, by: str | None, kind: Callable[[str], Any], count: int, wrong: str) -> Any:
     """Return the numbers of a text, which there must be `count` of, as a tuple."""
     try:
-        parts = tuple(kind(part) for part in text.split(by))
+        values = tuple(kind(word) for word in text.split(by))
     except ValueError:
-        parts = ()
-    if len(parts) != count:
+        values = ()
+    if len(values) != count:
         raise SceneError(wrong)
-    return parts
+    return values
 
 
 SWITCH: dict[str, bool | str] = {"yes": True, "no": False, "auto": AUTO}
@@ -242,16 +242,16 @@ READERS: dict[str, tuple[Callable[[str], Any], str | None]] = {
 }
 # settings that the command line uses itself, for its own camera and where it reads a scene
 OWN_OPTIONS = ("size", "view", "fov", "material", "smooth")
-RENDER_OPTIONS = [name for name, each in SETTINGS.items() if each.option and name not in OWN_OPTIONS]
+RENDER_OPTIONS = [name for name, setting in SETTINGS.items() if setting.option and name not in OWN_OPTIONS]
 DISPLAY_OPTIONS = ("gamma", "exposure", "tone", "white_balance")
 
 
 def add_settings(command: argparse.ArgumentParser) -> None:
     """Add an option for each setting that has one, and those of reading a scene."""
     add_reading(command)
-    for name, each in SETTINGS.items():
-        if each.option:
-            _add_setting(command, name, each)
+    for name, setting in SETTINGS.items():
+        if setting.option:
+            _add_setting(command, name, setting)
     command.add_argument(
         "--color",
         type=color_value,
@@ -283,7 +283,7 @@ def add_reading(command: argparse.ArgumentParser) -> None:
 
 def reading(options: argparse.Namespace) -> dict[str, Any]:
     """Return the options of reading a scene file, as arguments of `load`."""
-    folders = [os.path.join(getattr(options, "folder", None) or "", each) for each in options.search_path]
+    folders = [os.path.join(getattr(options, "folder", None) or "", folder) for folder in options.search_path]
     moving = {"time": getattr(options, "time", None), "animation": _name_or_number(options)}
     return {"parameters": dict(options.define), "search_paths": folders, **moving}
 
@@ -342,10 +342,10 @@ def display_values(options: argparse.Namespace) -> dict[str, Any]:
 
 def _add_setting(command: argparse.ArgumentParser, name: str, setting: Setting) -> None:
     """Add the option of a setting that has one."""
-    own = name in (*OWN_OPTIONS, "up") or setting.default in (None, ())
+    keeps_default = name in (*OWN_OPTIONS, "up") or setting.default in (None, ())
     how: dict[str, Any] = {
         "help": setting.option,
-        "default": setting.default if own else Default(setting.default),
+        "default": setting.default if keeps_default else Default(setting.default),
     }
     flag = setting.flag or name
     if name in READERS:

@@ -118,8 +118,8 @@ def _render_scene(path: str, output: str, options: argparse.Namespace) -> int:
     """Render a scene and save the picture; return the exit status."""
     progress = False if options.quiet else None
     scene = read_scene(path, options, progress)
-    given = (options.origin, options.view, options.direction)
-    if isinstance(scene.camera, Sensors) and all(each is None for each in given):
+    viewpoint = (options.origin, options.view, options.direction)
+    if isinstance(scene.camera, Sensors) and all(option is None for option in viewpoint):
         raise SceneError(f"{path}: has a sensor that measures light: wavefront measure {path} -o out.csv")
     command = {"arguments": options.arguments, "folder": options.folder}
     settings = {**_view(path, scene, options), **setting_values(options), "progress": progress}
@@ -191,11 +191,11 @@ def _resume(path: str, parser: argparse.ArgumentParser) -> int:
         if command is None:
             raise SceneError(f"{path}: was not begun by wavefront render; call render(checkpoint=...) again")
         arguments, folder = command["arguments"], os.fspath(command["folder"])
-        if not all(isinstance(each, str) for each in arguments):
+        if not all(isinstance(argument, str) for argument in arguments):
             raise TypeError("an argument is no text")
     options = parser.parse_args(arguments)
     options.arguments, options.folder = arguments, folder
-    options.scenes = [os.path.join(options.folder, each) for each in options.scenes]
+    options.scenes = [os.path.join(options.folder, scene) for scene in options.scenes]
     options.output = os.path.join(options.folder, options.output)
     options.checkpoint = path
     status: int = options.run(options)

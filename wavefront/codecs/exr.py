@@ -115,26 +115,26 @@ def decode_all(data: bytes, budget: Budget | None = None) -> ImageData | None:
         return None
     info, first = from_json(text), _parts(data, budget or Budget.of(data))[0]
     size = _window(first)
-    channels = {name: partial(_pixels, each, size) for name, each in first.channels.items()}
+    channels = {name: partial(_pixels, channel, size) for name, channel in first.channels.items()}
     layout = info.pop("arrays", {})
     try:
         arrays = {
-            name: _array([channels[label]() for label in part["channels"]], part)
-            for name, part in layout.items()
+            name: _array([channels[label]() for label in field["channels"]], field)
+            for name, field in layout.items()
         }
     except (KeyError, TypeError, ValueError, AttributeError) as error:
         raise SceneError(f"its attribute {ATTRIBUTE!r} does not fit its channels: {error!r}") from error
     return from_named(arrays, info)
 
 
-def _array(words: list[NDArray[Any]], part: dict[str, Any]) -> NDArray[Any]:
+def _array(words: list[NDArray[Any]], field: dict[str, Any]) -> NDArray[Any]:
     """Return the array of some channels (H, W) as the layout in the attributes describes it."""
-    if part["type"] not in TYPES:
-        raise ValueError(f"type {part['type']!r}")
-    kind, stacked = np.dtype(part["type"]), np.stack(words, axis=-1)
-    whole = math.prod(part["shape"]) == len(words)
+    if field["type"] not in TYPES:
+        raise ValueError(f"type {field['type']!r}")
+    kind, stacked = np.dtype(field["type"]), np.stack(words, axis=-1)
+    whole = math.prod(field["shape"]) == len(words)
     values = stacked.astype(kind) if whole and kind.itemsize == 8 else stacked.view(kind)
-    return values.reshape(*stacked.shape[:2], *part["shape"])
+    return values.reshape(*stacked.shape[:2], *field["shape"])
 
 
 def _parts(data: bytes, budget: Budget) -> list[Any]:
@@ -170,8 +170,8 @@ class _OneThread:
 def _pixels(channel: Any, size: tuple[int, int]) -> NDArray[Any]:
     """Return the values of a channel for every pixel; some have values for every second one."""
     values, steps = channel.pixels, (int(channel.ySampling), int(channel.xSampling))
-    there = tuple(-(-length // step) for length, step in zip(size, steps, strict=True))
-    if min(steps) < 1 or values.shape != there or min(there) < 1:
+    expected = tuple(-(-length // step) for length, step in zip(size, steps, strict=True))
+    if min(steps) < 1 or values.shape != expected or min(expected) < 1:
         raise SceneError(
             f"channel {channel.name!r} has {values.shape[1]} × {values.shape[0]} values; "
             f"the picture has {size[1]} × {size[0]} pixels"
@@ -188,8 +188,8 @@ def _spread(values: NDArray[Any], axis: int, step: int, length: int) -> Floats:
     low = at.astype(np.intp)
     high = np.minimum(low + 1, values.shape[axis] - 1)
     weight = (at - low).astype(np.float32).reshape((-1, 1) if axis == 0 else (1, -1))
-    one, two = (values.take(places, axis).astype(np.float32) for places in (low, high))
-    return one + (two - one) * weight
+    lower, upper = (values.take(places, axis).astype(np.float32) for places in (low, high))
+    return lower + (upper - lower) * weight
 
 
 def _check_header(parts: list[Any], size: int, budget: Budget) -> None:

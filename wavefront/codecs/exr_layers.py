@@ -44,17 +44,17 @@ class Layer:
     kind: tuple[str, ...]  # components that are shown; one of another name is gray
 
     def rank(self) -> tuple[int, ...]:
-        """Return what sorts layers, the picture first."""
+        """Return the key that sorts layers, the picture first."""
         words = self.name.lower().replace("_", ".").split(".")
-        own = [word for word in words if word not in ("left", LAST_VIEW)]
+        title_words = [word for word in words if word not in ("left", LAST_VIEW)]
         plain = all("." not in channel for channel in self.channels.values())
-        known = 0 if own and own[-1] in PICTURES else 1 if plain and self.part == 0 else 2
+        known = 0 if title_words and title_words[-1] in PICTURES else 1 if plain and self.part == 0 else 2
         kind = 0 if self.kind in (COLOR, CHROMA) else 1 if self.kind == GRAY else 2
         return kind, known, LAST_VIEW in words, self.part, not plain
 
     def picture(self, values: Mapping[str, NDArray[Any]], primaries: Any = None) -> Floats:
         """Return the pixels (H, W, C) of channels by name."""
-        shown = [values[self.channels[each]].astype(np.float32, copy=False) for each in self.kind]
+        shown = [values[self.channels[component]].astype(np.float32, copy=False) for component in self.kind]
         if self.kind == CHROMA:
             shown = _from_chroma(shown, REC_709 if primaries is None else primaries)
         if "A" in self.channels and self.kind != ("A",):
@@ -74,17 +74,17 @@ def chosen(parts: Sequence[tuple[str, list[str], Mapping[str, Any]]]) -> Layer:
     parts
         Name, names of channels, and header of each part.
     """
-    found = [
+    layers = [
         layer
         for k, (name, channels, _) in enumerate(parts)
         for layer in _layers(k, name, channels, len(parts))
     ]
-    best = min(found, key=Layer.rank)
+    best = min(layers, key=Layer.rank)
     kind, known, *_ = best.rank()
-    shown = ", ".join(best.channels[each] for each in best.kind)
-    if kind == 2 and sum(len(layer.channels) for layer in found) > 1:
+    shown = ", ".join(best.channels[component] for component in best.kind)
+    if kind == 2 and sum(len(layer.channels) for layer in layers) > 1:
         warn_caller(f"has no channels of colors; {shown!r} is shown as gray")
-    elif known == 2 and (count := sum(layer.rank()[0] == kind for layer in found)) > 1:
+    elif known == 2 and (count := sum(layer.rank()[0] == kind for layer in layers)) > 1:
         warn_caller(f"has {count} layers, none called 'combined' or 'beauty'; {best.name!r} is shown")
     return best
 
@@ -97,10 +97,10 @@ def _layers(part: int, title: str, channels: list[str], parts: int) -> list[Laye
         groups.setdefault(prefix, {})[WORDS.get(component.lower(), component.upper())] = channel
     out = []
     for prefix, group in groups.items():
-        name = ".".join(each for each in (title if parts > 1 else "", prefix) if each)
+        name = ".".join(word for word in (title if parts > 1 else "", prefix) if word)
         kind: tuple[str, ...] | None = GRAY if group.keys() - {"A"} == {"Y"} else None
         kind = next((kind for kind in (COLOR, CHROMA) if group.keys() >= set(kind)), kind)
-        out.append(Layer(part, name, group, kind or (min(group, key=lambda each: each == "A"),)))
+        out.append(Layer(part, name, group, kind or (min(group, key=lambda component: component == "A"),)))
     return out
 
 

@@ -29,8 +29,8 @@ class ImageData:
     @property
     def metadata(self) -> Mapping[str, Any]:
         """Settings and results of the render."""
-        found: Mapping[str, Any] = self.info.get("metadata", {})
-        return found
+        metadata: Mapping[str, Any] = self.info.get("metadata", {})
+        return metadata
 
     @property
     def alpha(self) -> Floats | None:
@@ -58,8 +58,8 @@ def from_named(arrays: Mapping[str, NDArray[Any]], info: Mapping[str, Any]) -> I
     others = dict(arrays)
     rgb = others.pop("rgb", None)
     if rgb is None or rgb.ndim != 3 or rgb.shape[2] != 3 or rgb.dtype != np.float32:
-        found = "is missing" if rgb is None else f"is {rgb.dtype} of shape {rgb.shape}"
-        raise SceneError(f"the array 'rgb' {found}; a picture has one of float32, (height, width, 3)")
+        fault = "is missing" if rgb is None else f"is {rgb.dtype} of shape {rgb.shape}"
+        raise SceneError(f"the array 'rgb' {fault}; a picture has one of float32, (height, width, 3)")
     check_size(rgb.shape[0], rgb.shape[1])
     for name, values in others.items():
         if values.shape[:2] != rgb.shape[:2] or values.dtype.kind not in "fiub":
@@ -81,7 +81,7 @@ def to_json(info: Mapping[str, Any]) -> str:
 
 
 def _plain(value: Any) -> Any:
-    """Return what JSON can hold in place of a value that it cannot."""
+    """Return a value as JSON can hold it: a list of the numbers of an array, or its text."""
     return value.tolist() if isinstance(value, np.ndarray | np.generic) else str(value)
 
 

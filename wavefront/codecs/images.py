@@ -162,9 +162,9 @@ def _picture(path: str | os.PathLike[str]) -> ImageData:
     data, name, extension = read_bytes(path), os.fspath(path), Path(path).suffix.lower()
     whole = ALL_OF_IT.get(extension)
     budget = Budget.of(data)
-    found = None if whole is None else _decode(name, whole, data, extension[1:], budget)
-    if found is not None:
-        return found
+    picture = None if whole is None else _decode(name, whole, data, extension[1:], budget)
+    if picture is not None:
+        return picture
     pixels = decode_codes(data, name, budget)
     if not 1 <= pixels.shape[2] <= 4:
         raise SceneError(f"{name}: has {pixels.shape[2]} channels; a picture has 1 to 4")
@@ -229,7 +229,7 @@ def _decode(name: str, decode: Callable[[bytes, Budget], T], data: bytes, kind: 
     """Return the result of `decode`; its errors and warnings name the file."""
     try:
         with collect_warnings() as said:
-            found = decode(data, budget)
+            decoded = decode(data, budget)
     except MemoryError:  # `in_memory` says more
         raise
     except SceneError as error:
@@ -240,7 +240,7 @@ def _decode(name: str, decode: Callable[[bytes, Budget], T], data: bytes, kind: 
         raise SceneError(f"{name}: not a readable {kind} image: {reason}") from error
     for message in said:
         warn_caller(f"{name}: {message}")
-    return found
+    return decoded
 
 
 def _find(table: Registry[T], path: str | os.PathLike[str], error: type[SceneError] = SceneError) -> T:
@@ -277,8 +277,8 @@ def _finite(path: str | os.PathLike[str], picture: ImageData) -> ImageData:
     bad = int(np.count_nonzero(~np.isfinite(picture.rgb).all(axis=2)))
     if not bad:
         return picture
-    found = plural(bad, "pixel is", "pixels are")
-    warn_caller(f"{os.fspath(path)}: {found} not finite; NaN is written as 0")
+    amount = plural(bad, "pixel is", "pixels are")
+    warn_caller(f"{os.fspath(path)}: {amount} not finite; NaN is written as 0")
     return picture.with_rgb(np.nan_to_num(picture.rgb, nan=0.0))
 
 

@@ -61,15 +61,15 @@ class _Numbers:
 
     def take(self, what: str, count: int, low: float = 0.0, high: float = MOST) -> Doubles:
         """Return the next numbers (count,), each in [low, high]."""
-        part = self.found[self.at : self.at + count]
+        words = self.found[self.at : self.at + count]
         self.at += count
-        if len(part) < count:
-            there = f"{len(part)} of {plural(count, 'number')}"
-            raise SceneError(f"{self.name} line {self.last}: ends within {what}, with {there}")
-        values = np.array([_number(word) for _, word in part], np.float64)
+        if len(words) < count:
+            got = f"{len(words)} of {plural(count, 'number')}"
+            raise SceneError(f"{self.name} line {self.last}: ends within {what}, with {got}")
+        values = np.array([_number(word) for _, word in words], np.float64)
         bad = np.flatnonzero(~((values >= low) & (values <= high)))
         if bad.size:
-            line, word = part[bad[0]]
+            line, word = words[bad[0]]
             limit = f"a number from {low:g} to {high:g}"
             raise SceneError(f"{self.name} line {line}: {what} is {word[:40]!r}; it must be {limit}")
         return values
@@ -88,8 +88,8 @@ class _Numbers:
         bad = np.flatnonzero(~(np.diff(values) >= LEAST_STEP))
         if bad.size:
             line, word = self.found[self.at - count + int(bad[0]) + 1]
-            found = f"{what} is {word} after {values[bad[0]]:g}"
-            raise SceneError(f"{self.name} line {line}: {found}; it must increase by {LEAST_STEP:g}")
+            step = f"{what} is {word} after {values[bad[0]]:g}"
+            raise SceneError(f"{self.name} line {line}: {step}; it must increase by {LEAST_STEP:g}")
         return values
 
 
@@ -137,8 +137,8 @@ def parsed_luminaire(name: str, text: str, tilt: str) -> Photometry:
 
 
 def _lm63(name: str, lines: list[str], beside: list[str]) -> Photometry:
-    found = ((at, TILT.match(line)) for at, line in enumerate(lines))
-    start, tilting = next(((at, match[1]) for at, match in found if match), (0, ""))
+    matches = ((at, TILT.match(line)) for at, line in enumerate(lines))
+    start, tilting = next(((at, match[1]) for at, match in matches if match), (0, ""))
     if not tilting:
         raise SceneError(f"{name}: has no line TILT=...; it is no file of LM-63")
     numbers = _Numbers(name, lines, start + 1, " ")

@@ -58,8 +58,8 @@ def parsed_measurement(name: str, data: bytes) -> AdaptiveTables | Floats:
         values = np.frombuffer(data, "<f8", offset=12).reshape(3, *MERL_SHAPE)
         bad = np.flatnonzero(~(np.abs(values.ravel()) < 1e9))
         if bad.size:
-            found = values.ravel()[bad[0]]
-            raise SceneError(f"{name} byte {12 + 8 * bad[0]}: value is {found}; it must be below 1e9")
+            value = values.ravel()[bad[0]]
+            raise SceneError(f"{name} byte {12 + 8 * bad[0]}: value is {value}; it must be below 1e9")
         return (np.maximum(values, 0) * MERL_SCALE[:, None, None, None]).astype(
             f4
         )  # -1 where nothing is known
@@ -134,7 +134,9 @@ def _adaptive(name: str, tensors: _Tensors) -> AdaptiveTables:
     vndf = tensors.take("vndf", (p, t, None, None))
     alike = slice(None, 1 if p <= 2 else None)  # isotropic files have one azimuth, or one twice
     ndf, sigma = (tensors.take(field, (None, None))[None] for field in ("ndf", "sigma"))
-    vndf, luminance = (np.maximum(each[alike], 0).reshape(-1, *each.shape[2:]) for each in (vndf, luminance))
+    vndf, luminance = (
+        np.maximum(table[alike], 0).reshape(-1, *table.shape[2:]) for table in (vndf, luminance)
+    )
     rgb = np.maximum(rgb[:, alike], 0).reshape(3, -1, k, k)
     by_normals = bool(tensors.take("jacobian", (1,), "u1")[0])
     return AdaptiveTables(phi[alike], theta, ndf, sigma, vndf, luminance, rgb, by_normals)

@@ -103,7 +103,7 @@ def _shape(archive: zipfile.ZipFile, member: zipfile.ZipInfo) -> tuple[int, ...]
         return _checked_shape(member.filename, packed.read(MAX_HEADER), member.file_size)
 
 
-def _checked_shape(name: str, start: bytes, there: int) -> tuple[int, ...]:
+def _checked_shape(name: str, start: bytes, available: int) -> tuple[int, ...]:
     """Return the shape of an array in the format npy, given its first bytes and its size in bytes."""
     file = BytesIO(start)
     major, _ = np.lib.format.read_magic(file)
@@ -112,9 +112,9 @@ def _checked_shape(name: str, start: bytes, there: int) -> tuple[int, ...]:
         raise SceneError(f"the array {name!r} is of version {major} of npy; 1 and 2 are read")
     shape, _, kind = header(file)
     size = math.prod(shape) * kind.itemsize
-    if kind.kind not in KINDS or kind.hasobject or size != there - file.tell():
+    if kind.kind not in KINDS or kind.hasobject or size != available - file.tell():
         raise SceneError(
-            f"the array {name!r} is {kind} of shape {shape}, in {there} bytes; "
+            f"the array {name!r} is {kind} of shape {shape}, in {available} bytes; "
             "only numbers and text of their own size are read"
         )
     return tuple(shape)

@@ -56,11 +56,11 @@ def _plain(data: bytes, kind: bytes) -> tuple[int, int, int, float, int] | None:
     """Return width, height, channels, the largest value, and where the pixels begin."""
     words, at = [], 2
     for _ in range(2 if kind in BITS else 3):
-        found = WORD.match(data, at)
-        if found is None:
+        word = WORD.match(data, at)
+        if word is None:
             return None
-        words.append(found[1])
-        at = found.end()
+        words.append(word[1])
+        at = word.end()
     try:
         most = 1.0 if kind in BITS else float(words[2])
         return int(words[0]), int(words[1]), CHANNELS[kind], most, at + 1

@@ -69,9 +69,9 @@ def _check_png(data: bytes, budget: Budget) -> None:
     bits, interlaced = header[8] * PNG_CHANNELS[header[9]], header[12] == 1
     need = sum(rows * (1 + (columns * bits + 7) // 8) for columns, rows in _passes(width, height, interlaced))
     pixels = [(content, check) for name, content, check in png_chunks(data) if name == b"IDAT"]
-    there = _inflated((content for content, _ in pixels), need)
-    if there < need:
-        raise SceneError(f"ends early: {width} × {height} pixels take {need} bytes; {there} are there")
+    available = _inflated((content for content, _ in pixels), need)
+    if available < need:
+        raise SceneError(f"ends early: {width} × {height} pixels take {need} bytes; {available} are there")
     if item == 2 and any(zlib.crc32(content, zlib.crc32(b"IDAT")) != check for content, check in pixels):
         raise SceneError("the checksum of a chunk b'IDAT' is wrong")
 

@@ -96,16 +96,16 @@ def _tags(data: bytes) -> dict[int, tuple[int, ...]]:
         raise SceneError(f"has a directory of {count} entries")
     at += 8 if big else 2
     entry, inside = struct.Struct(f"{order}HH{'Q8s' if big else 'I4s'}"), 8 if big else 4
-    found = {}
+    tags = {}
     for tag, kind, length, value in entry.iter_unpack(data[at : at + count * entry.size]):
         size = length * struct.calcsize(f"={TYPES[kind]}") if kind in TYPES else 0
         if not 0 < size <= len(data):
             continue
         start = 0 if size <= inside else struct.unpack(f"{order}{'Q' if big else 'I'}", value)[0]
-        found[tag] = struct.unpack_from(
+        tags[tag] = struct.unpack_from(
             f"{order}{length}{TYPES[kind]}", value if size <= inside else data, start
         )
-    return found
+    return tags
 
 
 def _one(tags: dict[int, tuple[int, ...]], tag: int, default: int) -> int:
@@ -114,16 +114,16 @@ def _one(tags: dict[int, tuple[int, ...]], tag: int, default: int) -> int:
 
 def _values(data: bytes, layout: _Layout) -> NDArray[Any]:
     """Return the numbers as stored, (H, W, samples)."""
-    each = layout.samples // layout.planes
+    samples = layout.samples // layout.planes
     padded = math.ceil(layout.width / layout.across) * layout.across
     planes = []
     for offsets, counts in _pieces(layout):
-        raw = _rows(data, layout, offsets, counts, padded * each * layout.kind.itemsize)
-        parts = [
-            _predicted(np.ascontiguousarray(part), layout, each)
-            for part in np.split(raw, padded // layout.across, axis=1)
+        raw = _rows(data, layout, offsets, counts, padded * samples * layout.kind.itemsize)
+        tiles = [
+            _predicted(np.ascontiguousarray(tile), layout, samples)
+            for tile in np.split(raw, padded // layout.across, axis=1)
         ]
-        planes.append(np.concatenate(parts, axis=1))
+        planes.append(np.concatenate(tiles, axis=1))
     return np.concatenate(planes, axis=2)[:, : layout.width]
 
 
@@ -136,8 +136,8 @@ def _pieces(layout: _Layout) -> Iterator[tuple[tuple[int, ...], tuple[int, ...]]
     if not number or len(counts) != len(offsets):
         raise SceneError("has no pixels: the directory is damaged")
     for k in range(layout.planes):
-        part = slice(k * number, (k + 1) * number)
-        yield offsets[part], counts[part]
+        plane = slice(k * number, (k + 1) * number)
+        yield offsets[plane], counts[plane]
 
 
 def _rows(
@@ -146,7 +146,7 @@ def _rows(
     """Return the decompressed rows of a plane, (H, size), with the columns that fill the last tiles."""
     from PIL import Image  # imported here to keep `import wavefront` quick
 
-    tags, each = (
+    tags, tile_bytes = (
         layout.tags,
         size * layout.across // (math.ceil(layout.width / layout.across) * layout.across),
     )
@@ -159,7 +159,7 @@ def _rows(
         SAMPLES: (1,),
     }
     if TILE_OFFSETS in tags:
-        shown |= {TILE_WIDTH: (each,), TILE_HEIGHT: tags[TILE_HEIGHT]}
+        shown |= {TILE_WIDTH: (tile_bytes,), TILE_HEIGHT: tags[TILE_HEIGHT]}
         shown |= {TILE_OFFSETS: offsets, TILE_COUNTS: counts}
     else:
         shown |= {
@@ -189,19 +189,19 @@ def _file(data: bytes, tags: dict[int, tuple[int, ...]]) -> bytes:
     return bytes(out + bytes(4))
 
 
-def _predicted(raw: NDArray[np.uint8], layout: _Layout, each: int) -> NDArray[Any]:
-    """Return the numbers (H, columns, each) of decompressed bytes (H, n)."""
+def _predicted(raw: NDArray[np.uint8], layout: _Layout, samples: int) -> NDArray[Any]:
+    """Return the numbers (H, columns, samples) of decompressed bytes (H, n)."""
     height, item = len(raw), layout.kind.itemsize
     predictor = _one(layout.tags, PREDICTOR, 1)
     if predictor == 3:
-        sums = np.cumsum(raw.reshape(height, -1, each), axis=1, dtype=np.uint8)
+        sums = np.cumsum(raw.reshape(height, -1, samples), axis=1, dtype=np.uint8)
         split = sums.reshape(height, item, -1).transpose(0, 2, 1)  # the highest bytes come first
-        return np.ascontiguousarray(split).view(f">f{item}").reshape(height, -1, each)
-    values = raw.view(layout.kind).reshape(height, -1, each)
+        return np.ascontiguousarray(split).view(f">f{item}").reshape(height, -1, samples)
+    values = raw.view(layout.kind).reshape(height, -1, samples)
     if predictor != 2:
         return values
     whole = np.dtype(f"u{item}")
-    words = raw.view(np.dtype(f"{layout.kind.str[0]}u{item}")).reshape(height, -1, each).astype(whole)
+    words = raw.view(np.dtype(f"{layout.kind.str[0]}u{item}")).reshape(height, -1, samples).astype(whole)
     sums = np.cumsum(words, axis=1, dtype=whole)
     return sums if layout.kind.kind == "u" else sums.view(f"f{item}")
 

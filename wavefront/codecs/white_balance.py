@@ -44,14 +44,14 @@ def white_balance_matrix(white: WhiteBalance) -> Doubles:
         low, high = KELVIN
         limit = f"{low:g} to {high:g} kelvin, or a linear RGB"
         kelvin = number("white_balance", white, lambda x: low <= x <= high, limit)
-        found, wanted = _planckian(kelvin), _planckian(NEUTRAL)
+        source, target = _planckian(kelvin), _planckian(NEUTRAL)
     else:
         gray = rgb("white_balance", white, dtype=np.float64)[:, 0]
         if not gray.min() > 0:
             raise SceneError(f"white_balance is {white!r}; each component must be above 0")
-        found = XYZ_OF_RGB @ gray
-        wanted = XYZ_OF_RGB @ np.full(3, found[1])
-    gains = (BRADFORD @ wanted) / (BRADFORD @ found)
+        source = XYZ_OF_RGB @ gray
+        target = XYZ_OF_RGB @ np.full(3, source[1])
+    gains = (BRADFORD @ target) / (BRADFORD @ source)
     scaling = np.linalg.inv(BRADFORD) @ (gains[:, None] * BRADFORD)
     return np.asarray(np.linalg.inv(XYZ_OF_RGB) @ scaling @ XYZ_OF_RGB)
 

@@ -101,13 +101,13 @@ class DaylightCoefficients:
         SceneError
             If it has another shape.
         """
-        given = np.asarray(radiance, float)
-        if given.shape[:1] != (len(self.patches),) or given.ndim > 2:
-            raise SceneError(f"radiance has the shape {given.shape}; it must have a value for each patch")
-        each = np.stack([product(batch, given.reshape(len(given), -1)) for batch in self.batches])
-        shape = (len(self.points), *given.shape[1:])
-        error = each.std(0, ddof=1) / np.sqrt(len(each))
-        return each.mean(0).reshape(shape), error.reshape(shape)
+        values = np.asarray(radiance, float)
+        if values.shape[:1] != (len(self.patches),) or values.ndim > 2:
+            raise SceneError(f"radiance has the shape {values.shape}; it must have a value for each patch")
+        irradiances = np.stack([product(batch, values.reshape(len(values), -1)) for batch in self.batches])
+        shape = (len(self.points), *values.shape[1:])
+        error = irradiances.std(0, ddof=1) / np.sqrt(len(irradiances))
+        return irradiances.mean(0).reshape(shape), error.reshape(shape)
 
     def sky_radiance(self, sky: Any) -> Doubles:
         """Return the mean radiance (p,) of each patch of a `Sky`, without the sun's disk; its luminance.
@@ -157,11 +157,11 @@ class DaylightCoefficients:
         scattered = self.batches - self.direct
         factor = 1.0 if efficacy is None else number("efficacy", efficacy, lambda x: x > 0, "above 0 lm/W")
         beam = self.sunlight(weather) * factor
-        each = [
-            product(whole, sky * factor) + product(part, sun * factor) + beam
-            for whole, part in zip(self.batches, scattered, strict=True)
+        batches = [
+            product(total, sky * factor) + product(indirect, sun * factor) + beam
+            for total, indirect in zip(self.batches, scattered, strict=True)
         ]
-        return Year(np.stack(each).astype(f4), weather, weather.efficacy if efficacy is None else 1.0)
+        return Year(np.stack(batches).astype(f4), weather, weather.efficacy if efficacy is None else 1.0)
 
     def sunlight(self, weather: Weather) -> Doubles:
         """Return the irradiance (n, hours) of each point by the sun alone, W·m⁻², where nothing hides it."""
@@ -175,12 +175,12 @@ class DaylightCoefficients:
         )
         for start in range(0, at.size, PAIRS):
             i, h = at[start : start + PAIRS], hour[start : start + PAIRS]
-            part = _part_let_through(scene, places[i], weather.sun[h], start)
-            out[i, h] = part * cosine[i, h] * weather.direct_normal[h]
+            transmitted = _transmittance(scene, places[i], weather.sun[h], start)
+            out[i, h] = transmitted * cosine[i, h] * weather.direct_normal[h]
         return out
 
 
-def _part_let_through(scene: CompiledScene, places: Doubles, toward: Doubles, first: int) -> Floats:
+def _transmittance(scene: CompiledScene, places: Doubles, toward: Doubles, first: int) -> Floats:
     """Return the part (n,) of light from infinity that gets to places (n, 3), from unit vectors (n, 3).
 
     Alpha and media take their part of it, the luminance of that of each channel. Grids of media draw numbers,
@@ -215,7 +215,7 @@ def daylight_coefficients(
     spp: int = 1024,
     **settings: Unpack[RenderSettings],
 ) -> DaylightCoefficients:
-    """Measure what each patch of the sky brings to points; any sky is then a product of matrices.
+    """Measure the light of each patch of the sky at points; any sky is then a product of matrices.
 
     All patches are measured at once: the sky is an environment of radiance 1, and light counts for the patch
     that it comes from.
@@ -276,12 +276,12 @@ def daylight_coefficients(
     places = sensors.above(subject.bounds)
     wave = max(256, WAVE_VALUES // (3 * len(patches)))
     bounds = [count * batch // BATCHES for batch in range(BATCHES + 1)]
-    given = {"wave_size": wave, "reuse": False, **settings, "up": AUTO, "aovs": ("light_groups",)}
+    fixed = {"wave_size": wave, "reuse": False, **settings, "up": AUTO, "aovs": ("light_groups",)}
     both = [
         np.stack(
             [
-                _on_patches(subject, places, {**given, **bounces, "samples": range(*part)}, len(patches))
-                for part in pairwise(bounds)
+                _on_patches(subject, places, {**fixed, **bounces, "samples": range(*samples)}, len(patches))
+                for samples in pairwise(bounds)
             ]
         )
         for bounces in ({}, {"max_bounces": 0})
@@ -290,7 +290,7 @@ def daylight_coefficients(
 
 
 def _on_patches(scene: Scene, sensors: Sensors, settings: dict[str, Any], patches: int) -> Doubles:
-    """Return the luminance (n, p) of what each patch brings."""
-    found = measured(scene, sensors, None, settings)
-    parts = [found.part(f"light_groups.patch {number}")[0] for number in range(patches)]
-    return np.stack([luminance(part.T.astype(float)) for part in parts], 1)
+    """Return the luminance (n, p) of the light of each patch."""
+    measurement = measured(scene, sensors, None, settings)
+    colors = [measurement.part(f"light_groups.patch {number}")[0] for number in range(patches)]
+    return np.stack([luminance(color.T.astype(float)) for color in colors], 1)

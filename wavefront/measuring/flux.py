@@ -73,17 +73,17 @@ def measure_flux(
         scene, settings.get("material"), settings.get("progress"), settings.get("smooth", AUTO)
     )
     toward = SIDES[one_of("side", side, tuple(SIDES))]
-    parts = _chosen(subject, shapes)
-    triangles = [_triangles(each) for each in parts]
-    counts = np.array([len(each) for each in triangles])
+    measured_shapes = _chosen(subject, shapes)
+    triangles = [_triangles(shape) for shape in measured_shapes]
+    counts = np.array([len(corners) for corners in triangles])
     if faces:
-        if len(parts) != 1 or not counts[0]:
+        if len(measured_shapes) != 1 or not counts[0]:
             raise SceneError("faces is True; that is for one shape, which is a mesh")
         counts = np.ones(counts[0], np.intp)
     spheres = np.zeros((counts.size, 4))
-    for row, each in enumerate(parts):
-        if isinstance(each, Sphere):
-            spheres[row] = (*each.center, each.radius)
+    for row, shape in enumerate(measured_shapes):
+        if isinstance(shape, Sphere):
+            spheres[row] = (*shape.center, shape.radius)
     one_of("kind", kind, KINDS)
     surfaces = SurfaceSensors(np.concatenate(triangles), counts, spheres, kind, toward)
     return measured(subject, surfaces.above(subject.bounds), spp, settings)
@@ -93,17 +93,19 @@ def _chosen(scene: Scene, shapes: Any) -> list[Shape]:
     """Return shapes that are given by themselves or by names."""
     several: Sequence[Any] = [shapes] if isinstance(shapes, str | Shape) else list(shapes)
     names = {shape.name for shape in scene.shapes}
-    found: list[Shape] = []
-    for each in several:
-        if isinstance(each, str):
-            one_of("shapes: name", each, tuple(names))
-        found += [shape for shape in scene.shapes if shape.name == each] if isinstance(each, str) else [each]
-    if not found:
+    chosen: list[Shape] = []
+    for element in several:
+        if isinstance(element, str):
+            one_of("shapes: name", element, tuple(names))
+            chosen += [shape for shape in scene.shapes if shape.name == element]
+        else:
+            chosen.append(element)
+    if not chosen:
         raise SceneError("shapes is empty; there must be at least one")
-    for each in found:
-        if not isinstance(each, Mesh | Instance | Sphere):
-            raise SceneError(f"shapes has {in_brief(each)}; power is measured at meshes and spheres")
-    return found
+    for shape in chosen:
+        if not isinstance(shape, Mesh | Instance | Sphere):
+            raise SceneError(f"shapes has {in_brief(shape)}; power is measured at meshes and spheres")
+    return chosen
 
 
 def _triangles(shape: Shape) -> Doubles:

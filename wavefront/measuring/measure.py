@@ -101,7 +101,7 @@ def measured(
     settings: Mapping[str, Any],
     command: dict[str, Any] | None = None,
 ) -> Measurement:
-    """Return what sensors measure in a scene, with settings of `measure`; `command` is for checkpoints."""
+    """Return the measurement by sensors in a scene; settings as of `measure`, `command` for checkpoints."""
     subject = copy(scene)
     subject.settings = {name: value for name, value in scene.settings.items() if name not in REFUSED}
     session = Session(subject, spp, **sensor_settings(settings, sensors), camera=sensors)
@@ -109,7 +109,7 @@ def measured(
     return Measurement(finish(session))
 
 
-def sensor_settings(given: Mapping[str, Any], sensors: Sensors) -> dict[str, Any]:
+def sensor_settings(settings: Mapping[str, Any], sensors: Sensors) -> dict[str, Any]:
     """Return settings of a render for sensors.
 
     Raises
@@ -117,17 +117,17 @@ def sensor_settings(given: Mapping[str, Any], sensors: Sensors) -> dict[str, Any
     SceneError
         If one of them is for pictures only.
     """
-    if given.get("caustics") is True:
+    if settings.get("caustics") is True:
         raise SceneError("caustics is True; paths from lights reach no point")
-    if given.get("reuse") is True and not sensors.may_share:
+    if settings.get("reuse") is True and not sensors.may_share:
         raise SceneError("reuse is True; power on shapes is measured without it")
-    refuse({name: value for name, value in given.items() if value is not False}, REFUSED)
-    aovs = chosen_aovs("aovs", given.get("aovs", ()))
+    refuse({name: value for name, value in settings.items() if value is not False}, REFUSED)
+    aovs = chosen_aovs("aovs", settings.get("aovs", ()))
     for name in aovs:
         if name not in LAYERS:
             raise SceneError(f"aovs has {name!r}; sensors have {', '.join(LAYERS)}")
-    lighting = given.get("lighting", AUTO)
+    lighting = settings.get("lighting", AUTO)
     fixed = {"caustics": False, "denoise": False, "filter": "box", "ground": False}
     if not sensors.may_share:
         fixed["reuse"] = False
-    return {**given, **fixed, "aovs": aovs, "lighting": None if lighting == AUTO else lighting}
+    return {**settings, **fixed, "aovs": aovs, "lighting": None if lighting == AUTO else lighting}

@@ -89,7 +89,7 @@ class Measurement(Answers):
         return f"<Measurement: {self}>"
 
     def __str__(self) -> str:
-        """Return what was measured, at how many points, the largest relative error, and how much it is."""
+        """Return the kind of light, the number of points, the largest relative error and the range of lux."""
         places = plural(self._count, "point")
         known = f"{self.kind} at {places}, estimated error {self.metadata['noise']:.2%} at most"
         if LUX not in self.image.layers:
@@ -163,7 +163,7 @@ class Measurement(Answers):
     def _moderated(self) -> tuple[Doubles, Doubles, Doubles]:
         """Return means, their variances and the degrees of freedom of these, (n, 3) each, in radiance."""
         rows = (self.image.rgb, self.image.variance, self.image.standard_error)
-        mean, single, error = (self._rows(each).astype(np.float64) for each in rows)
+        mean, single, error = (self._rows(array).astype(np.float64) for array in rows)
         samples = np.broadcast_to(np.maximum(self.samples, 2)[:, None].astype(np.float64), mean.shape)
         freedom = np.broadcast_to(self._rows(self.image.freedom())[:, None], mean.shape)
         return mean, *moderated_variance(samples, mean, single / samples, np.square(error), freedom)
@@ -172,7 +172,7 @@ class Measurement(Answers):
         """Return the means (n, 3) of values over those of the sixteen points near each other that are lit."""
         tile = nearby_ranks(self.points.astype(np.float64), self.normals) // MEMBERS
         counted = [np.where(lit, values, 0), lit.astype(np.float64)]
-        sums, count = (np.stack([np.bincount(tile, row) for row in each.T], 1) for each in counted)
+        sums, count = (np.stack([np.bincount(tile, row) for row in channels.T], 1) for channels in counted)
         return (sums / np.maximum(count, 1)).take(tile, 0)
 
     def _unseen(self, confidence: float) -> Doubles:
@@ -183,8 +183,8 @@ class Measurement(Answers):
         narrow = self.image.layers.get(NARROW)
         if narrow is None:
             return np.zeros(self.value.shape)
-        own = self._rows(narrow).astype(np.float64)[:, None]
-        typical = np.maximum(own, self._near(own, np.ones_like(own, np.bool_)))
+        lobes = self._rows(narrow).astype(np.float64)[:, None]
+        typical = np.maximum(lobes, self._near(lobes, np.ones_like(lobes, np.bool_)))
         chance = rule_of_three(confidence, self.samples)[:, None]
         return np.asarray(chance * typical * np.array(self.metadata[BRIGHTEST]))
 
@@ -217,8 +217,8 @@ class Measurement(Answers):
             If it was not asked for.
         """
         if name not in self.image.errors:
-            found = ", ".join(self.image.errors) or "no part"
-            raise SceneError(f"{name!r} was not measured; there is {found}: measure(aovs=...) asks for parts")
+            names = ", ".join(self.image.errors) or "no part"
+            raise SceneError(f"{name!r} was not measured; there is {names}: measure(aovs=...) asks for parts")
         return self._light(self.image.layers[name]), self._light(self.image.errors[name])
 
     def merge(self, other: Measurement) -> Measurement:
@@ -269,8 +269,8 @@ class Measurement(Answers):
             If there is no such kind.
         """
         column = 1 + KINDS_OF_LIGHT.index(one_of("kind", kind, KINDS_OF_LIGHT))
-        found = self._photometric
-        return found.value[:, column], found.standard_error[:, column]
+        photometric = self._photometric
+        return photometric.value[:, column], photometric.standard_error[:, column]
 
     @cached_property
     def _photometric(self) -> Measurement:
@@ -302,17 +302,19 @@ class Measurement(Answers):
         luminance, of flux lumens.
         """
         axes = ("x", "y", "z")
-        tables = [(axes, self.points), (tuple(f"n{each}" for each in axes), self.normals)]
-        tables += [(COLORS, self.value), (tuple(f"{each}_error" for each in COLORS), self.standard_error)]
+        tables = [(axes, self.points), (tuple(f"n{axis}" for axis in axes), self.normals)]
+        tables += [(COLORS, self.value), (tuple(f"{color}_error" for color in COLORS), self.standard_error)]
         if LUX in self.image.layers:
             name = PHOTOMETRIC[self.kind][0]
             tables.append(((name, f"{name}_error"), np.stack([self.lux, self.lux_error], 1)))
         for name in self.image.errors:
             value, error = self.part(name)
-            tables.append((tuple(f"{name}.{each}" for each in COLORS), value))
-            tables.append((tuple(f"{name}.{each}_error" for each in COLORS), error))
-        found = {name: column for names, table in tables for name, column in zip(names, table.T, strict=True)}
-        return {**found, "samples": self.samples}
+            tables.append((tuple(f"{name}.{color}" for color in COLORS), value))
+            tables.append((tuple(f"{name}.{color}_error" for color in COLORS), error))
+        columns = {
+            name: column for names, table in tables for name, column in zip(names, table.T, strict=True)
+        }
+        return {**columns, "samples": self.samples}
 
     def save(self, path: str | os.PathLike[str]) -> None:
         """Write the measurement by the extension: npz holds all of it, csv the table of `columns`.

@@ -15,24 +15,26 @@ if TYPE_CHECKING:
     from .measurement import Measurement
 
 
-def draw(found: Measurement, levels: int, axes: Any, label: str | None, unit: str, cmap: Any) -> Any:
+def draw(measurement: Measurement, levels: int, axes: Any, label: str | None, unit: str, cmap: Any) -> Any:
     """Draw a measurement over the two axes along which its points are spread most, and return the axes."""
     pyplot = import_pyplot()
-    across, up = np.sort(np.argsort(-np.ptp(found.points, axis=0), kind="stable")[:2])
-    x, y = found.points[:, across], found.points[:, up]
+    across, up = np.sort(np.argsort(-np.ptp(measurement.points, axis=0), kind="stable")[:2])
+    x, y = measurement.points[:, across], measurement.points[:, up]
     if np.linalg.matrix_rank(np.stack([x - x[0], y - y[0]]), tol=1e-6 * np.ptp(x)) < 2:
         raise SceneError("plot: the points are on one line; they must cover a plane")
-    value = found.lux if one_of("unit", unit, ("watts", "lux")) == "lux" else luminance(found.value.T)
+    value = (
+        measurement.lux if one_of("unit", unit, ("watts", "lux")) == "lux" else luminance(measurement.value.T)
+    )
     axes = pyplot.subplots()[1] if axes is None else axes
     filled = axes.tricontourf(x, y, value, 64, cmap=cmap)
     if np.ptp(value) > 0:
         axes.clabel(axes.tricontour(x, y, value, levels, colors="white", linewidths=0.7), fontsize="small")
-    axes.figure.colorbar(filled, ax=axes, label=label or f"{found.kind}, {_unit(found, unit)}")
+    axes.figure.colorbar(filled, ax=axes, label=label or f"{measurement.kind}, {_unit(measurement, unit)}")
     axes.set_aspect("equal")
     axes.set_xlabel("xyz"[across])
     axes.set_ylabel("xyz"[up])
     return axes
 
 
-def _unit(found: Measurement, unit: str) -> str:
-    return PHOTOMETRIC[found.kind][1] if unit == "lux" else UNITS[found.kind]
+def _unit(measurement: Measurement, unit: str) -> str:
+    return PHOTOMETRIC[measurement.kind][1] if unit == "lux" else UNITS[measurement.kind]

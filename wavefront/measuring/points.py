@@ -50,7 +50,7 @@ def grid_points(
         raise SceneError(
             f"grid_points: counts is {in_brief(counts)}; it must be two whole numbers, or one for both"
         )
-    many, rows = (whole_number(1, MOST)("grid_points: counts", each) for each in both)
+    many, rows = (whole_number(1, MOST)("grid_points: counts", count) for count in both)
     normal = np.cross(u, v)
     length = np.linalg.norm(normal)
     if not length > 0:

@@ -69,7 +69,7 @@ class Weather:
             raise SceneError(
                 f"direct_normal and diffuse_horizontal have {both} hours; they must have as many"
             )
-        given = finite_array("sun", sun, (*shape, 3))
+        towards = finite_array("sun", sun, (*shape, 3))
         for name, values in (
             ("direct_normal", self.direct_normal),
             ("diffuse_horizontal", self.diffuse_horizontal),
@@ -77,10 +77,10 @@ class Weather:
             if (values < 0).any():
                 at = int(values.argmin())
                 raise SceneError(f"{name}[{at}] is {exact(values[at])}; it must be at least 0")
-        length = np.sqrt((given * given).sum(1, keepdims=True))
+        length = np.sqrt((towards * towards).sum(1, keepdims=True))
         if not length.all():
             raise SceneError(f"sun[{int(length.argmin())}] is zero; it must have a direction")
-        self.sun = given / length
+        self.sun = towards / length
 
     def __len__(self) -> int:
         """Return the number of hours."""

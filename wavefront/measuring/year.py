@@ -129,6 +129,6 @@ class Year:
             raise SceneError("hours is empty; there must be at least one hour")
         light = self.batches[:, :, chosen].astype(float)
         count, whole = len(light), light.sum(0)
-        without = np.stack([figure((whole - one) / (count - 1)) for one in light])
+        without = np.stack([figure((whole - batch) / (count - 1)) for batch in light])
         away = without - without.mean(0)
         return figure(whole / count), np.sqrt((count - 1) / count * (away * away).sum(0))
