@@ -49,23 +49,23 @@ def annotated_objects(shapes: Sequence[Shape], names: Iterable[str] | None) -> d
     wanted = list(known) if names is None else [names] if isinstance(names, str) else list(names)
     for name in wanted:
         if name not in known:
-            there = ", ".join(map(repr, known))[:200]
+            listed = ", ".join(map(repr, known))[:200]
             raise SceneError(
-                f"objects has {name!r}; shapes of the scene are {there}{did_you_mean(name, known)}"
+                f"objects has {name!r}; shapes of the scene are {listed}{did_you_mean(name, known)}"
             )
     categories = {name: number for number, name in enumerate(dict.fromkeys(wanted), 1)}
     models: dict[int, int] = {}
-    found = {}
+    objects = {}
     for number, shape in enumerate(shapes):
         if shape.name in categories:
             pose = _rigid_pose(shape)
             mesh = shape.mesh if isinstance(shape, Instance) and pose is not None else None
             model = models.setdefault(id(shape if mesh is None else mesh), len(models) + 1)
             placed = np.eye(4) if pose is None else pose
-            found[number] = AnnotatedObject(
+            objects[number] = AnnotatedObject(
                 number, shape.name, categories[shape.name], model, mesh is not None, placed
             )
-    return found
+    return objects
 
 
 def _rigid_pose(shape: Shape) -> Doubles | None:

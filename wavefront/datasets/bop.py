@@ -71,8 +71,8 @@ class BopLayout:
 
     def write_view(self, view: DatasetView) -> Any:
         """Write the picture, the depth and the masks of a view, and return its annotations."""
-        for each in FOLDERS:
-            make_folder(self._folder / each)
+        for name in FOLDERS:
+            make_folder(self._folder / name)
         view.write_colors(str(self._folder / "rgb" / f"{view.name}.png"))
         depth, scale = self._depth_codes(view.image.depth)
         self._write_png(f"depth/{view.name}", depth)
@@ -160,7 +160,7 @@ class BopLayout:
 
 
 def _info(whole: Mask, seen: Mask, depth: NDArray[np.uint16]) -> dict[str, Any]:
-    """Return what is known of an object from its silhouette in the picture and what is seen of it."""
+    """Return the boxes and pixel counts of an object, from its silhouette and the part of it that is seen."""
     count, visible = int(whole.sum()), int(seen.sum())
     return {
         "bbox_obj": mask_box(whole) if visible else NO_BOX,

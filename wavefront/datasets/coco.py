@@ -43,12 +43,12 @@ class CocoLayout:
         make_folder(self._folder / IMAGES)
         view.write_colors(str(self._folder / IMAGES / f"{view.name}.png"))
         height, width = view.image.shape[:2]
-        found = []
+        annotations = []
         for number, item in view.objects.items():
             mask = view.image.shape_id == number
             box = mask_box(mask)
             if box is not None:
-                found.append(
+                annotations.append(
                     {
                         "category_id": item.category,
                         "bbox": box,
@@ -58,14 +58,14 @@ class CocoLayout:
                         "shape_id": number,
                     }
                 )
-        return {"size": [width, height], "annotations": found}
+        return {"size": [width, height], "annotations": annotations}
 
     def write_index(self, views: Mapping[int, Any]) -> None:
         """Write the annotations of all views."""
         annotations: list[dict[str, Any]] = []
         for number, view in views.items():
-            for each in view["annotations"]:  # ids from 1 on: readers take an annotation 0 for none
-                annotations.append({"id": len(annotations) + 1, "image_id": number, **each})
+            for annotation in view["annotations"]:  # ids from 1 on: readers take an annotation 0 for none
+                annotations.append({"id": len(annotations) + 1, "image_id": number, **annotation})
         categories = {item.category: item.name for item in self._objects.values()}
         write_json(
             self._folder / "annotations.json",

@@ -138,8 +138,8 @@ def write_dataset(
     display = Display(gamma, exposure, tone, white_balance)
     if settings.get("denoise") is None:  # what learns from pictures must not learn a denoiser's ways
         settings["denoise"] = bool(subject.settings.get("denoise"))
-    asked, own = chosen_aovs("aovs", settings.get("aovs", ())), AOVS_NEEDED
-    settings["aovs"] = (*asked, *own, *(AOVS_OF_FLOW if FLOW_LAYOUTS.keys() & set(chosen) else ()))
+    asked, needed = chosen_aovs("aovs", settings.get("aovs", ())), AOVS_NEEDED
+    settings["aovs"] = (*asked, *needed, *(AOVS_OF_FLOW if FLOW_LAYOUTS.keys() & set(chosen) else ()))
     plan = moments(subject, views, seconds, bool(flow_names(settings["aovs"])))
     about = {
         "format": sorted(chosen),
@@ -174,13 +174,13 @@ class _Writer:
         self, plan: list[Moment], spp: int | None, settings: RenderSettings, names: Iterable[str] | None
     ) -> int:
         """Write the data set; return how many views were rendered."""
-        for each in (self._root, self._root / AOVS_FOLDER, self._root / VIEWS_FOLDER):
-            make_folder(each)
-        found, rendered = dict[int, dict[str, Any]](), 0
+        for directory in (self._root, self._root / AOVS_FOLDER, self._root / VIEWS_FOLDER):
+            make_folder(directory)
+        unsorted, rendered = dict[int, dict[str, Any]](), 0
         for moment in plan:
-            given: Any = {**settings, **moment.about, "camera": moment.views[0].camera}
+            session_settings: Any = {**settings, **moment.about, "camera": moment.views[0].camera}
             objects = annotated_objects(moment.scene.shapes, names)
-            with Session(moment.scene, spp, **given) as session:
+            with Session(moment.scene, spp, **session_settings) as session:
                 for view in moment.views:
                     if view is not moment.views[0]:
                         session.set_camera(view.camera)
@@ -189,17 +189,17 @@ class _Writer:
                     if record is None:
                         record = self._render(view, objects, session, identity)
                         rendered += 1
-                    found[view.number] = record
-        records = dict(sorted(found.items()))
+                    unsorted[view.number] = record
+        records = dict(sorted(unsorted.items()))
         write_json(
-            self._root / "cameras.json", {view_name(at): each["camera"] for at, each in records.items()}
+            self._root / "cameras.json", {view_name(at): record["camera"] for at, record in records.items()}
         )
         for name, layout in self._layouts.items():
-            layout.write_index({at: each["layouts"][name] for at, each in records.items()})
+            layout.write_index({at: record["layouts"][name] for at, record in records.items()})
         return rendered
 
     def _identity(self, session: Session, moment: Moment) -> dict[str, Any] | None:
-        """Return what a view must have in common with this one; None if it cannot be compared."""
+        """Return the identity of a view, by which it is known again; None if it cannot be compared."""
         about = {name: list(value) for name, value in moment.about.items()}
         try:
             return {**session.identity(), **self._about, **about}
@@ -262,20 +262,20 @@ def _checked_cameras(
     cameras: Iterable[Camera], size: ImageSize | None, layouts: dict[str, Layout]
 ) -> list[Camera]:
     """Return the cameras in the size that is asked for."""
-    found = []
+    checked = []
     for at, camera in enumerate(iterable("cameras", cameras, "cameras, such as wf.turntable(scene, 12)")):
         name = f"cameras[{at}]"
         check_camera(name, camera)
-        found.append(camera if size is None else camera.resized(size))
+        checked.append(camera if size is None else camera.resized(size))
         try:
             camera.intrinsics()
         except SceneError as error:
             raise SceneError(f"{name}: {error}") from error
         for layout in layouts.values():
             layout.check(name, camera)
-    if not found:
+    if not checked:
         raise SceneError("cameras is empty; a data set needs at least one")
-    return found
+    return checked
 
 
 def _length(name: str, value: float) -> float:

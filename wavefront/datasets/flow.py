@@ -77,8 +77,8 @@ class SintelLayout(FlowLayout):
             view.write_colors(str(self._path(folder, camera, f"{name}.png")))
         if view.frame + 1 < view.frames:
             view.image.save_flow(self._path("flow", camera, f"{name}.flo"))
-            found = view.image.flow_occluded
-            for folder, mask in (("occlusions", found == 1), ("invalid", found == -1)):
+            occluded = view.image.flow_occluded
+            for folder, mask in (("occlusions", occluded == 1), ("invalid", occluded == -1)):
                 codes = np.repeat(mask[..., None].astype(np.uint8) * np.uint8(255), 3, 2)
                 write_bytes(self._path(folder, camera, f"{name}.png"), png_of_codes(codes))
         return None

@@ -126,16 +126,16 @@ def diameter(points: Doubles) -> float:
         [np.linalg.norm(block - c, axis=1).max() for block, c in zip(blocks, center, strict=True)]
     )
     most = np.linalg.norm(center[:, None] - center, axis=2) + radius[:, None] + radius
-    found = 0.0
+    largest = 0.0
     for pair in np.argsort(-most, axis=None).tolist():
-        one, other = divmod(pair, len(blocks))
-        if most[one, other] <= found:
+        first, second = divmod(pair, len(blocks))
+        if most[first, second] <= largest:
             break
-        if one <= other:
-            a, b = blocks[one], blocks[other]
+        if first <= second:
+            a, b = blocks[first], blocks[second]
             squares = (a**2).sum(1)[:, None] + (b**2).sum(1) - 2 * (a @ b.T)
-            found = max(found, float(squares.max()) ** 0.5)
-    return found
+            largest = max(largest, float(squares.max()) ** 0.5)
+    return largest
 
 
 def _blocks(points: Doubles, size: int) -> list[Doubles]:

@@ -43,12 +43,12 @@ def checked_times(times: Iterable[float] | None, shutter: Any) -> list[float] | 
     """
     if times is None:
         return None
-    found = finite_array("times", list(times) if isinstance(times, Iterable) else times, (None,))
-    if not len(found) or not (np.diff(found) > 0).all():
-        raise SceneError(f"times is {found.tolist()}; they must rise, and there must be at least one")
+    seconds = finite_array("times", list(times) if isinstance(times, Iterable) else times, (None,))
+    if not len(seconds) or not (np.diff(seconds) > 0).all():
+        raise SceneError(f"times is {seconds.tolist()}; they must rise, and there must be at least one")
     if shutter is not None:
         raise SceneError("shutter is of one time; views at several times have none")
-    return [float(each) for each in found]
+    return [float(time) for time in seconds]
 
 
 def moments(scene: Scene, cameras: Sequence[Camera], times: list[float] | None, flow: bool) -> list[Moment]:

@@ -91,7 +91,7 @@ def camera_matrices(camera: Camera, farthest: float) -> dict[str, Any]:
 
 
 def _distortion(lens: Projection) -> dict[str, Any]:
-    """Return what a record says of a lens beside K."""
+    """Return the entries of a record about a lens, other than K."""
     if isinstance(lens, Fisheye):
         numbers = [0.0] * 4 if lens.distortion is None else lens.distortion.tolist()
         return {"model": "fisheye", "mapping": lens.mapping, "distortion": numbers}

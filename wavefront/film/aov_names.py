@@ -147,15 +147,15 @@ def chosen_aovs(name: str, value: Any) -> tuple[str, ...]:
     chosen = [value] if isinstance(value, str) else list(value) if isinstance(value, Iterable) else None
     if chosen is None:
         raise SceneError(f"{name} is {value!r}; it must be the name of an AOV, or several names")
-    for each in chosen:
-        if not isinstance(each, str) or (each not in (*known, ALL_AOVS) and not is_noted(each)):
+    for aov in chosen:
+        if not isinstance(aov, str) or (aov not in (*known, ALL_AOVS) and not is_noted(aov)):
             raise SceneError(
-                f"{name} has {each!r}; there are {', '.join(known)}, and {ALL_AOVS!r} for all but "
-                f"{', '.join((*FLOW_AOVS, *KEYED_AOVS, BOXES))}{did_you_mean(each, known)}"
+                f"{name} has {aov!r}; there are {', '.join(known)}, and {ALL_AOVS!r} for all but "
+                f"{', '.join((*FLOW_AOVS, *KEYED_AOVS, BOXES))}{did_you_mean(aov, known)}"
             )
     wanted = {*chosen, *(AOVS if ALL_AOVS in chosen else ())}
-    noted = (each for each in dict.fromkeys(chosen) if is_noted(each))
-    return (*(each for each in known if each in wanted), *noted)
+    noted = (aov for aov in dict.fromkeys(chosen) if is_noted(aov))
+    return (*(aov for aov in known if aov in wanted), *noted)
 
 
 GUIDES = "denoising_albedo", "denoising_normal"  # the AOVs that guide denoisers

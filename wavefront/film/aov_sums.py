@@ -50,9 +50,9 @@ class CountSums(Sums):
         """Add numbers (k,) of other samples."""
         self.counts[0, lanes] += counts
 
-    def totals(self, part: slice) -> tuple[Doubles, Doubles]:
+    def totals(self, span: slice) -> tuple[Doubles, Doubles]:
         """Return the sums of the samples and of their squares, each (1, k): a sample is 0 or 1."""
-        counts = self.counts[:, part].astype(np.float64)
+        counts = self.counts[:, span].astype(np.float64)
         return counts, counts
 
 
@@ -87,9 +87,9 @@ class FixedPointSums(Sums):
         if max(np.abs(sums).max(initial=0) for sums in (self.sums, self.squares)) <= LARGEST_NARROW:
             self.sums, self.squares = self.sums.astype(np.int32), self.squares.astype(np.int32)
 
-    def totals(self, part: slice) -> tuple[Doubles, Doubles]:
+    def totals(self, span: slice) -> tuple[Doubles, Doubles]:
         """Return the sums of the samples and of their squares, each (c, k)."""
-        sums, squares = self.sums[:, part].astype(np.float64), self.squares[:, part].astype(np.float64)
+        sums, squares = self.sums[:, span].astype(np.float64), self.squares[:, span].astype(np.float64)
         return sums * UNIT, squares * UNIT
 
 
@@ -129,9 +129,9 @@ class RadianceSums(SquareSums):
             self.sums.add(lanes, radiance.astype(np.float64))
             super().add(lanes, radiance)
 
-    def totals(self, part: slice) -> tuple[Doubles, Doubles]:
+    def totals(self, span: slice) -> tuple[Doubles, Doubles]:
         """Return the sums of the samples and of their squares, each (3, k)."""
-        return self.sums.value(part), self.squares[:, part].astype(np.float64)
+        return self.sums.value(span), self.squares[:, span].astype(np.float64)
 
 
 def without_zeros(radiance: Floats) -> Floats:
@@ -217,39 +217,39 @@ class AovSums(Sums):
         if self.narrow is not None and samples.narrow is not None:
             self.narrow.add(lanes, samples.narrow)
         for start in range(0, pixels.size, CHUNK):
-            part = slice(start, start + CHUNK)
-            lanes = pixel_span(pixels[part])
+            chunk = slice(start, start + CHUNK)
+            lanes = pixel_span(pixels[chunk])
             for name, sums in self.radiance.items():
-                sums.add(lanes, samples.radiance[name][:, :, part])
+                sums.add(lanes, samples.radiance[name][:, :, chunk])
             if self.indirect is not None:
-                self.indirect.add(lanes, radiance[:, :, part] - samples.radiance["direct"][:, :, part])
+                self.indirect.add(lanes, radiance[:, :, chunk] - samples.radiance["direct"][:, :, chunk])
 
     def estimate(self, name: str, picture: ExactSums, count: Ints) -> AovEstimate:
         """Return an AOV from its sums, those of the picture, and the samples of each pixel (pixels,)."""
         if name in self.measured:
-            found = self.measured[name].estimates()
-            return AovEstimate(found.mean, found.standard_error, found.variance)
+            estimates = self.measured[name].estimates()
+            return AovEstimate(estimates.mean, estimates.standard_error, estimates.variance)
         if name == NARROW:
             assert self.narrow is not None
             return AovEstimate(self.narrow.typical()[:, None], None)
         shape = self._pixels, aov_of(name).channels
         means, errors = np.empty(shape, f4), np.empty(shape, f4)
-        for part in chunks(self._pixels):
-            sums, squares = self._totals(name, picture, part)
-            n = np.maximum(count[part], 1)
+        for span in chunks(self._pixels):
+            sums, squares = self._totals(name, picture, span)
+            n = np.maximum(count[span], 1)
             mean = sums / n
             spread = np.maximum(squares - n * np.square(mean), 0)
-            variance = np.where(count[part] > 1, spread, np.nan) / np.maximum(n - 1, 1)
+            variance = np.where(count[span] > 1, spread, np.nan) / np.maximum(n - 1, 1)
             with np.errstate(over="ignore"):
-                means[part], errors[part] = mean.T, np.sqrt(variance / n).T
+                means[span], errors[span] = mean.T, np.sqrt(variance / n).T
         return AovEstimate(means, errors)
 
-    def _totals(self, name: str, picture: ExactSums, part: slice) -> tuple[Doubles, Doubles]:
+    def _totals(self, name: str, picture: ExactSums, span: slice) -> tuple[Doubles, Doubles]:
         """Return the sums of the samples of an AOV and of their squares, each (c, k)."""
         if name == "indirect":
             assert self.indirect is not None
-            direct, _ = self.radiance["direct"].totals(part)
-            return picture.value(part) - direct, self.indirect.squares[:, part].astype(np.float64)
+            direct, _ = self.radiance["direct"].totals(span)
+            return picture.value(span) - direct, self.indirect.squares[:, span].astype(np.float64)
         if name in self.counts:
-            return self.counts[name].totals(part)
-        return self.bounded[name].totals(part) if name in self.bounded else self.radiance[name].totals(part)
+            return self.counts[name].totals(span)
+        return self.bounded[name].totals(span) if name in self.bounded else self.radiance[name].totals(span)

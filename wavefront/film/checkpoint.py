@@ -123,7 +123,7 @@ def _opened(path: str | os.PathLike[str]) -> Iterator[tuple[ZipFile, dict[str, A
 
 
 def read_header(path: str | os.PathLike[str]) -> dict[str, Any]:
-    """Return what a checkpoint holds beside arrays.
+    """Return the header of a checkpoint: all but its arrays.
 
     Raises
     ------
@@ -187,7 +187,7 @@ def check_identity(
     path
         Of the file.
     before, now
-        What both must have in common.
+        The identities of the two renders, which must agree.
     otherwise
         What the message says besides.
 
@@ -196,10 +196,10 @@ def check_identity(
     SceneError
         If not. The message names what differs.
     """
-    found = differences(before, now)
-    if found:
+    changed = differences(before, now)
+    if changed:
         raise SceneError(
-            f"{os.fspath(path)}: is the checkpoint of another render: {', '.join(found)}; "
+            f"{os.fspath(path)}: is the checkpoint of another render: {', '.join(changed)}; "
             f"render as before, or choose another file{otherwise}"
         )
 

@@ -102,8 +102,8 @@ class Film(Sums):
         if dropped.size:
             self._drop(pixels[dropped % pixels.size])
         for start in range(0, pixels.size, CHUNK):
-            part = slice(start, start + CHUNK)
-            self._add(pixel_span(pixels[part]), radiance[:, :, part])
+            chunk = slice(start, start + CHUNK)
+            self._add(pixel_span(pixels[chunk]), radiance[:, :, chunk])
 
     def _add(self, lanes: Lanes, radiance: Floats) -> None:
         """Add samples (3, samples, k) of at most `CHUNK` pixels."""
@@ -155,8 +155,8 @@ class Film(Sums):
 
     def restore(self, arrays: Mapping[str, NDArray[Any]], prefix: str = "") -> None:
         """Take the sums from what `arrays` returned, under names that begin with `prefix`; without a copy."""
-        found = arrays.get(f"{prefix}dropped", NONE)
-        self.dropped = np.zeros(self.count.size if found.size else 0, np.int32)
+        dropped = arrays.get(f"{prefix}dropped", NONE)
+        self.dropped = np.zeros(self.count.size if dropped.size else 0, np.int32)
         super().restore(arrays, prefix)
 
     def merge(self, other: Film) -> None:
@@ -249,18 +249,18 @@ class Film(Sums):
             samples = lengths.astype(np.float64)[:, None, None]
             means = self.batches[: lengths.size, :, span] / samples
             mean = (means * samples).sum(0) / samples.sum()
-            found = (means - mean) * np.sqrt(samples / ((samples.size - 1) * self.count[0]))
+            scaled = (means - mean) * np.sqrt(samples / ((samples.size - 1) * self.count[0]))
         else:
             counts, most = self.count[span], max(count // batch_size(count) for count in distinct(self.count))
-            found = np.zeros((most, 3, counts.size))
+            scaled = np.zeros((most, 3, counts.size))
             for count in distinct(counts):
                 lanes, size = np.flatnonzero(counts == count), batch_size(count)
                 used = count // size
                 means = take(self.batches[:used, :, span], lanes) / np.float64(size)
-                found[:used, :, lanes] = (means - means.mean(0)) * np.sqrt(size / (count * (used - 1)))
+                scaled[:used, :, lanes] = (means - means.mean(0)) * np.sqrt(size / (count * (used - 1)))
         if self.dropped.size:
-            found[:, :, self.dropped[span] > 0] = 0
-        return found
+            scaled[:, :, self.dropped[span] > 0] = 0
+        return scaled
 
     def halves(self, span: slice = slice(None)) -> Doubles:
         """Return half the difference of the means of two halves of the samples, (3, k).
@@ -271,19 +271,19 @@ class Film(Sums):
         lengths, or without the last samples, the difference is scaled accordingly. NaN for fewer than two
         samples.
         """
-        found = np.full((3, self.count[span].size), np.nan)
+        half_differences = np.full((3, self.count[span].size), np.nan)
         lengths = self.lengths[self.lengths > 0]
         for count in distinct(self.count[span]):
             if count > 1:
                 lanes = np.flatnonzero(self.count[span] == count)
-                each = lengths if lengths.size else np.full(count // batch_size(count), batch_size(count))
-                apart = _half_difference(take(self.batches[: each.size, :, span], lanes), each)
-                found[:, lanes] = apart * np.sqrt(each.sum() / count)
+                sizes = lengths if lengths.size else np.full(count // batch_size(count), batch_size(count))
+                apart = _half_difference(take(self.batches[: sizes.size, :, span], lanes), sizes)
+                half_differences[:, lanes] = apart * np.sqrt(sizes.sum() / count)
         if self.dropped.size:
             some = np.flatnonzero(self.dropped[span])
             alone = self._variance_of_samples(span) / np.maximum(self.used(span), 1)
-            found[:, some] = np.copysign(np.sqrt(alone), found)[:, some]
-        return found if self.light is None else found + self.light.halves(span)
+            half_differences[:, some] = np.copysign(np.sqrt(alone), half_differences)[:, some]
+        return half_differences if self.light is None else half_differences + self.light.halves(span)
 
     def relative_variance(self, outliers: float = OUTLIERS) -> Doubles:
         """Estimate the squared relative error of each pixel, the mean of its channels, (pixels,).

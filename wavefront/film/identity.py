@@ -13,9 +13,9 @@ COMPILED_FOR = ("accelerator", "integrator", "light_sampler")  # settings on whi
 
 
 def differences(before: Mapping[str, Any], now: Mapping[str, Any]) -> list[str]:
-    """Return what differs between the identities of two renders, in words.
+    """Return the differences between the identities of two renders, in words.
 
-    What follows from another difference is left out.
+    A difference that follows from another one is left out.
     """
     changed = {key for key in {**before, **now} if before.get(key) != now.get(key)}
     follows = {CODE + key for key in changed}

@@ -48,7 +48,7 @@ class LightSums(Sums):
         self.batches = {str(batch): ExactSums((3, pixels), MORE_TERMS) for batch in range(BATCHES)}
 
     def add(self, sample: int, paths: int, pixel: Words, radiance: Floats) -> None:
-        """Add what some more paths from lights of a sample bring to pixels.
+        """Add the light that some more paths from lights of a sample bring to pixels.
 
         Parameters
         ----------
@@ -65,7 +65,7 @@ class LightSums(Sums):
         self.paths[batch] += paths
         terms = radiance.astype(np.float64)
         order = np.argsort(pixel, kind="stable")
-        found, first, count = _groups(pixel.take(order).astype(np.intp))
+        targets, first, count = _groups(pixel.take(order).astype(np.intp))
         for size in 1 << np.arange(int(count.max(initial=0)).bit_length() + 1):
             some = np.flatnonzero((count > size // 2) & (count <= size))
             for lanes in np.array_split(some, -(-some.size * int(size) // AT_ONCE) or 1):
@@ -73,10 +73,10 @@ class LightSums(Sums):
                     number = np.arange(size)[:, None]
                     real = number < count.take(lanes)
                     at = order.take(first.take(lanes) + np.where(real, number, 0))
-                    self.batches[str(batch)].add(found.take(lanes), terms[:, at] * real)
+                    self.batches[str(batch)].add(targets.take(lanes), terms[:, at] * real)
 
     def mean(self, span: slice = slice(None)) -> Doubles:
-        """Return what paths from lights bring to pixels, (3, k)."""
+        """Return the light that paths from lights bring to pixels, (3, k)."""
         total = sum(sums.value(span) for sums in self.batches.values())
         return np.asarray(total / max(int(self.paths.sum()), 1))
 

@@ -84,11 +84,11 @@ def merged_sums(a: PictureSums | None, b: PictureSums | None) -> PictureSums:
             "pictures without the sums of their samples cannot be merged: render with samples=range(...) and "
             "save as npz, or merge checkpoints"
         )
-    for part in (a, b):
-        _check_counts(part.film.count)
-    found = differences(a.identity, b.identity)
-    if found:
-        raise SceneError(f"pictures of different renders cannot be merged: {', '.join(found)}")
+    for picture in (a, b):
+        _check_counts(picture.film.count)
+    changed = differences(a.identity, b.identity)
+    if changed:
+        raise SceneError(f"pictures of different renders cannot be merged: {', '.join(changed)}")
     merged = deepcopy(a)
     merged.merge(b)
     return merged

@@ -33,17 +33,17 @@ class Sums:
 
     def _parts(self) -> dict[str, Sums]:
         """Return the sums among the fields: by name, those of a dictionary by its keys."""
-        found: dict[str, Any] = {}
+        fields: dict[str, Any] = {}
         for name in self.FIELDS:
             value = getattr(self, name)
-            found |= value if isinstance(value, dict) else {name: value}
-        return {name: value for name, value in found.items() if isinstance(value, Sums)}
+            fields |= value if isinstance(value, dict) else {name: value}
+        return {name: value for name, value in fields.items() if isinstance(value, Sums)}
 
     def arrays(self) -> dict[str, NDArray[Any]]:
         """Return all sums as arrays by name: "squares", and those of a part as "part.squares"."""
         parts = {
-            f"{part}.{name}": array
-            for part, sums in self._parts().items()
+            f"{owner}.{name}": array
+            for owner, sums in self._parts().items()
             for name, array in sums.arrays().items()
         }
         return {**self._own(), **parts}
@@ -57,22 +57,22 @@ class Sums:
             If one is missing, or is of another shape or kind.
         """
         for name, mine in self._own().items():
-            found = arrays.get(prefix + name)
+            array = arrays.get(prefix + name)
             if (
-                found is None
-                or found.dtype.kind != mine.dtype.kind
-                or (mine.dtype.kind == "f" and found.dtype != mine.dtype)
+                array is None
+                or array.dtype.kind != mine.dtype.kind
+                or (mine.dtype.kind == "f" and array.dtype != mine.dtype)
             ):
                 raise SceneError(
                     f"the sums of the samples are incomplete: {prefix + name!r} is missing or of another type"
                 )
-            if found.shape != mine.shape:
+            if array.shape != mine.shape:
                 raise SceneError(
-                    f"the sums {prefix + name!r} have shape {found.shape}; it must be {mine.shape}"
+                    f"the sums {prefix + name!r} have shape {array.shape}; it must be {mine.shape}"
                 )
-            setattr(self, name, found)
-        for name, part in self._parts().items():
-            part.restore(arrays, f"{prefix}{name}.")
+            setattr(self, name, array)
+        for name, sums in self._parts().items():
+            sums.restore(arrays, f"{prefix}{name}.")
 
     def merge(self, other: Self) -> None:
         """Add the sums of other samples."""
@@ -81,11 +81,11 @@ class Sums:
             if others[name].size and name not in self.JOINED:
                 setattr(self, name, mine + others[name] if mine.size else others[name].copy())
         parts = other._parts()
-        for name, part in self._parts().items():
-            part.merge(parts[name])
+        for name, sums in self._parts().items():
+            sums.merge(parts[name])
 
 
 def bytes_per_pixel(make: Callable[[int], Sums]) -> int:
-    """Return how many bytes each pixel takes of the sums that `make` returns for a number of pixels."""
-    one, two = (sum(array.nbytes for array in make(pixels).arrays().values()) for pixels in (1, 2))
-    return two - one
+    """Return the bytes per pixel of the sums that `make` returns for a number of pixels."""
+    single, double = (sum(array.nbytes for array in make(pixels).arrays().values()) for pixels in (1, 2))
+    return double - single

@@ -201,8 +201,8 @@ def _pixels(name: str, picture: Image | ArrayLike) -> Doubles:
     bad = np.argwhere(~np.isfinite(colors))
     if len(bad):
         y, x, _ = bad[0]
-        found = plural(len(bad), "value that is", "values that are")
-        raise SceneError(f"{name} has {found} not finite, the first at x={x}, y={y}")
+        amount = plural(len(bad), "value that is", "values that are")
+        raise SceneError(f"{name} has {amount} not finite, the first at x={x}, y={y}")
     return colors
 
 
@@ -222,7 +222,7 @@ def _tested_samples(
     before = [picture.noisy if isinstance(picture, Image) else None for picture in (a, b)]
     if before[0] is None and before[1] is None:
         return _tested(a, b, left, right)
-    a, b = (noisy or given for noisy, given in zip(before, (a, b), strict=True))
+    a, b = (noisy or original for noisy, original in zip(before, (a, b), strict=True))
     if not all(np.isfinite(noisy.rgb).all() for noisy in before if noisy is not None):
         return None, "not computed: samples are not finite", ""
     p, absent, shared = _tested(a, b, _pixels(names[0], a), _pixels(names[1], b))
@@ -262,7 +262,7 @@ def _shared(a: Image | ArrayLike, b: Image | ArrayLike) -> tuple[str, float]:
 
 
 def _estimate(picture: Image | ArrayLike, mean: Doubles, factor: float) -> Estimate:
-    """Return what a testable picture, of linear values (H, W, 3), says of its mean and its error.
+    """Return the estimate of the mean of a testable picture, of linear values (H, W, 3), with its error.
 
     Variances are multiplied by `factor`.
     """

@@ -20,16 +20,16 @@ def cropped(image: Image, window: Any) -> Image:
     height, width = image.rgb.shape[:2]
     try:
         sides = [int(side) for side in window]
-        whole = len(sides) == 4 and all(side == given for side, given in zip(sides, window, strict=True))
+        whole = len(sides) == 4 and all(side == bound for side, bound in zip(sides, window, strict=True))
     except (TypeError, ValueError, OverflowError):
         whole, sides = False, []
     if not whole or not (0 <= sides[0] < sides[2] <= width and 0 <= sides[1] < sides[3] <= height):
         limit = f"four whole numbers (x0, y0, x1, y1) within {width}x{height}"
         raise SceneError(f"crop is {in_brief(window)}; it must be {limit}, and not empty")
-    part = np.s_[sides[1] : sides[3], sides[0] : sides[2]]
+    pixels = np.s_[sides[1] : sides[3], sides[0] : sides[2]]
 
     def of(values: Any) -> Any:
-        return None if values is None else values[part].copy()
+        return None if values is None else values[pixels].copy()
 
     metadata = dict(image.metadata)
     if "window" in metadata:
@@ -40,11 +40,11 @@ def cropped(image: Image, window: Any) -> Image:
         metadata=metadata,
         **{name: of(getattr(image, name)) for name in ("counts", "variance", "standard_error", "halves")},
         **{
-            name: {each: of(values) for each, values in getattr(image, name).items()}
+            name: {key: of(values) for key, values in getattr(image, name).items()}
             for name in ("layers", "errors", "measured")
         },
         sums=None,
-        scatter=[Scatter(of(each.deviations), of(each.tile)) for each in image.scatter],
+        scatter=[Scatter(of(scatter.deviations), of(scatter.tile)) for scatter in image.scatter],
     )
 
 
@@ -53,8 +53,8 @@ def resized(image: Image, size: ImageSize) -> Image:
     width, height = image_size(size)
     rows = _means(np.asarray(image.rgb, np.float64), height)
     pixels = _means(rows.transpose(1, 0, 2), width).transpose(1, 0, 2)
-    kept = {name: value for name, value in image.metadata.items() if name not in ("window", "film")}
-    return type(image)(pixels.astype(np.float32), image.spp, kept)
+    metadata = {name: value for name, value in image.metadata.items() if name not in ("window", "film")}
+    return type(image)(pixels.astype(np.float32), image.spp, metadata)
 
 
 def _means(values: Doubles, count: int) -> Doubles:
@@ -62,7 +62,7 @@ def _means(values: Doubles, count: int) -> Doubles:
     whole = np.concatenate([np.zeros((1, *values.shape[1:])), np.cumsum(values, 0)])
     place = np.arange(count + 1) * len(values) / count
     below = np.minimum(place.astype(np.intp), len(values) - 1)
-    part = (place - below).reshape(-1, *[1] * (values.ndim - 1))
-    sums = whole[below] + part * values[below]
+    fraction = (place - below).reshape(-1, *[1] * (values.ndim - 1))
+    sums = whole[below] + fraction * values[below]
     means: Doubles = np.diff(sums, axis=0) * (count / len(values))
     return means

@@ -169,7 +169,7 @@ class Image(Answers):
             raise SceneError(f"Image sums is {in_brief(sums)}; it must be that of another picture, or None")
         self.sums = sums
         self.scatter = tuple(iterable("Image scatter", scatter, "the scatter of another picture"))
-        if not all(isinstance(each, Scatter) for each in self.scatter):
+        if not all(isinstance(element, Scatter) for element in self.scatter):
             raise SceneError(f"Image scatter is {in_brief(scatter)}; it must be that of another picture")
         self.measured = self._planes("measured", measured)
 
@@ -185,8 +185,8 @@ class Image(Answers):
 
     def _planes(self, name: str, values: Any) -> dict[str, Any]:
         """Return arrays (H, W, ...) by name."""
-        found = mapping(f"Image {name}", values)
-        return {key: self._plane(f"{name}[{key!r}]", each) for key, each in found.items()}
+        arrays = mapping(f"Image {name}", values)
+        return {key: self._plane(f"{name}[{key!r}]", array) for key, array in arrays.items()}
 
     @property
     def light_groups(self) -> dict[str, NDArray[np.float32]]:
@@ -227,8 +227,8 @@ class Image(Answers):
         """Boxes of objects, from `aovs="boxes"`: see docs/layers.md. They are part of the metadata."""
         if BOXES not in self.metadata:
             raise AttributeError(f"the image has no boxes; render it with aovs=({BOXES!r},)")
-        found: list[dict[str, Any]] = self.metadata[BOXES]
-        return found
+        boxes: list[dict[str, Any]] = self.metadata[BOXES]
+        return boxes
 
     @suggests_keywords
     def mask(self, which: int | str, kind: str = "shape") -> Bools:
@@ -437,11 +437,11 @@ class Image(Answers):
                 halves = self.halves - other.halves
             if _same_counts(self, other) and self.variance is not None and other.variance is not None:
                 counts, variance = self.counts, self.variance + other.variance
-        sharing = [each for each in (self, other) if each.metadata.get("reuse")]
+        sharing = [picture for picture in (self, other) if picture.metadata.get("reuse")]
         scatter: tuple[Scatter, ...] = ()
         if error is not None and all(each.scatter for each in sharing):
-            parts = [(x.scatter, x.standard_error) for x in sharing if x.standard_error is not None]
-            scatter = scatter_of_difference(parts, error)
+            scatters = [(x.scatter, x.standard_error) for x in sharing if x.standard_error is not None]
+            scatter = scatter_of_difference(scatters, error)
         metadata = {"reuse": bool(sharing)}
         spp = min(self.spp, other.spp)
         return Image(
@@ -650,31 +650,31 @@ class Image(Answers):
             checkpoint = read_checkpoint(path)
             with contents_of(path):
                 return film_image(checkpoint.sums, checkpoint.metadata, keep_sums=True)
-        found = read_picture(path)
-        errors = {name.removeprefix(ERROR): a for name, a in found.arrays.items() if name.startswith(ERROR)}
+        picture = read_picture(path)
+        errors = {name.removeprefix(ERROR): a for name, a in picture.arrays.items() if name.startswith(ERROR)}
         measured = {
-            name.removeprefix(MEASURED): a for name, a in found.arrays.items() if name.startswith(MEASURED)
+            name.removeprefix(MEASURED): a for name, a in picture.arrays.items() if name.startswith(MEASURED)
         }
         layers = {
             name: a
-            for name, a in found.arrays.items()
+            for name, a in picture.arrays.items()
             if name not in FIELDS and not name.startswith((ERROR, MEASURED))
         }
-        scatter = {name: array for name, array in found.sums.items() if name.startswith(SCATTER)}
-        sums = {name: array for name, array in found.sums.items() if name not in scatter}
+        scatter = {name: array for name, array in picture.sums.items() if name.startswith(SCATTER)}
+        sums = {name: array for name, array in picture.sums.items() if name not in scatter}
         return cls(
-            found.rgb,
-            found.info.get("spp", 0),
-            dict(found.metadata),
-            counts=found.arrays.get("counts"),
-            variance=found.arrays.get("variance"),
-            standard_error=found.arrays.get("standard_error"),
-            halves=found.arrays.get("halves"),
+            picture.rgb,
+            picture.info.get("spp", 0),
+            dict(picture.metadata),
+            counts=picture.arrays.get("counts"),
+            variance=picture.arrays.get("variance"),
+            standard_error=picture.arrays.get("standard_error"),
+            halves=picture.arrays.get("halves"),
             layers=layers,
             errors=errors,
-            names=found.info.get("names"),
-            sums=restored_sums(os.fspath(path), found.rgb.shape, found.info.get("identity"), sums),
-            scatter=restored_scatter(os.fspath(path), found.rgb.shape, scatter),
+            names=picture.info.get("names"),
+            sums=restored_sums(os.fspath(path), picture.rgb.shape, picture.info.get("identity"), sums),
+            scatter=restored_scatter(os.fspath(path), picture.rgb.shape, scatter),
             measured=measured,
         )
 
@@ -885,7 +885,7 @@ class Image(Answers):
         >>> image = wf.render(spheres, 1, size=32, aovs=("flow", "flow_occluded"), flow_times=(0, 0.1))
         >>> image.save_flow("000000_10.png", hidden=False)
         """
-        known = tuple(each for each in FLOW_AOVS if each not in MASKS)
+        known = tuple(aov for aov in FLOW_AOVS if aov not in MASKS)
         layer = self.layers.get(one_of("name", name, known))
         mask = self.layers.get(f"{name}_occluded")
         if layer is None or (mask is None and not flag("hidden", hidden)):
@@ -987,11 +987,11 @@ class Image(Answers):
         arrays |= self.layers | {ERROR + name: values for name, values in self.errors.items()}
         arrays |= {MEASURED + name: values for name, values in self.measured.items()}
         info: dict[str, Any] = {"spp": self.spp, "metadata": self.metadata, "names": self.names}
-        kept = scatter_arrays(self.scatter)
+        scatter = scatter_arrays(self.scatter)
         if self.sums is None:
-            return ImageData(self.rgb, arrays, info, kept)
+            return ImageData(self.rgb, arrays, info, scatter)
         return ImageData(
-            self.rgb, arrays, {**info, "identity": self.sums.identity}, {**self.sums.arrays(), **kept}
+            self.rgb, arrays, {**info, "identity": self.sums.identity}, {**self.sums.arrays(), **scatter}
         )
 
     def _codes(self, display: Display, bits: int) -> NDArray[Any]:
@@ -1029,8 +1029,8 @@ def film_image(sums: PictureSums, metadata: Mapping[str, Any], keep_sums: bool) 
 
 def _of_samples(metadata: Mapping[str, Any]) -> dict[str, Any]:
     """Return the metadata of the samples of a picture that was denoised."""
-    kept = {name: value for name, value in metadata.items() if name != "denoiser"}
-    return {**kept, BEFORE_DENOISING: True}
+    others = {name: value for name, value in metadata.items() if name != "denoiser"}
+    return {**others, BEFORE_DENOISING: True}
 
 
 def _checked_pixels(rgb: Any) -> NDArray[Any]:
@@ -1098,16 +1098,16 @@ def _add_aovs(image: Image, sums: PictureSums) -> None:
         return
     width, height = sums.film.size
     for name in sums.layers.names:
-        found = sums.layers.estimate(name, sums.film.sums, sums.film.used())
-        image.layers[name] = _of_shape(found.mean, width, height)
-        if found.standard_error is None:
+        estimate = sums.layers.estimate(name, sums.film.sums, sums.film.used())
+        image.layers[name] = _of_shape(estimate.mean, width, height)
+        if estimate.standard_error is None:
             continue
-        error = _of_shape(found.standard_error, width, height)
-        if found.variance is None:
+        error = _of_shape(estimate.standard_error, width, height)
+        if estimate.variance is None:
             image.errors[name] = error
         else:
             image.measured[name + STANDARD_ERROR] = error
-            image.measured[name + VARIANCE] = _of_shape(found.variance, width, height)
+            image.measured[name + VARIANCE] = _of_shape(estimate.variance, width, height)
     if sums.film.light is not None and "indirect" in image.layers:
         _add_light_tracing(image, sums.film.light)
     if CLAMPED in image.layers:
@@ -1117,9 +1117,9 @@ def _add_aovs(image: Image, sums: PictureSums) -> None:
 def _add_light_tracing(image: Image, light: LightSums) -> None:
     """Add what paths from lights have found, all of it indirect light, to that layer of a picture."""
     layer, error = (values.reshape(-1, 3) for values in (image.layers["indirect"], image.errors["indirect"]))
-    for part in chunks(len(layer)):
-        layer[part] += light.mean(part).T
-        error[part] = np.sqrt(np.square(error[part], dtype=np.float64) + light.squared_error(part).T)
+    for pixels in chunks(len(layer)):
+        layer[pixels] += light.mean(pixels).T
+        error[pixels] = np.sqrt(np.square(error[pixels], dtype=np.float64) + light.squared_error(pixels).T)
 
 
 def _removed_part(rgb: Floats, removed: Floats) -> float:

@@ -70,22 +70,22 @@ def _distance(edges: Edges, reach: int) -> Doubles:
     return nearest
 
 
-def _lower(nearest: Doubles, found: Bools, dy: int, dx: int, away: float) -> None:
+def _lower(nearest: Doubles, mask: Bools, dy: int, dx: int, away: float) -> None:
     """Lower `nearest`[y, x] to `away` where `found`[y + dy, x + dx], in place."""
-    rows, columns = nearest.shape[0], found.shape[1]
+    rows, columns = nearest.shape[0], mask.shape[1]
     y = slice(max(0, -dy), min(rows, rows - dy))
     x = slice(max(0, -dx), min(nearest.shape[1], columns - dx))
     if y.start >= y.stop or x.start >= x.stop:
         return
-    part = nearest[y, x]
-    there = found[y.start + dy : y.stop + dy, x.start + dx : x.stop + dx]
-    np.minimum(part, np.where(there, away, np.inf), out=part)
+    target = nearest[y, x]
+    shifted = mask[y.start + dy : y.stop + dy, x.start + dx : x.stop + dx]
+    np.minimum(target, np.where(shifted, away, np.inf), out=target)
 
 
 def _smoothed(values: Doubles) -> Doubles:
     """Return values (H, W) averaged over 3 × 3 pixels, which takes the steps out of slanting lines."""
     for axis in (0, 1):
-        padded = np.pad(values, [(1, 1) if axis == each else (0, 0) for each in (0, 1)], mode="edge")
+        padded = np.pad(values, [(1, 1) if axis == other else (0, 0) for other in (0, 1)], mode="edge")
         first, last = (slice(None, -2), slice(2, None))
         ends = (padded[first], padded[last]) if axis == 0 else (padded[:, first], padded[:, last])
         values = 0.25 * ends[0] + 0.5 * values + 0.25 * ends[1]

@@ -113,8 +113,8 @@ def _draw_ids(axes: Any, ids: NDArray[Any], names: Mapping[int, str]) -> None:
     from matplotlib.patches import Patch
 
     axes.imshow(id_colors(ids), interpolation="nearest")
-    found, areas = np.unique(ids[ids >= 0], return_counts=True)
-    largest = np.sort(found[np.argsort(-areas, kind="stable")[:MOST_NAMES]])
+    numbers, areas = np.unique(ids[ids >= 0], return_counts=True)
+    largest = np.sort(numbers[np.argsort(-areas, kind="stable")[:MOST_NAMES]])
     patches = [
         Patch(color=color, label=names.get(int(number), str(number)))
         for number, color in zip(largest, id_colors(largest), strict=True)

@@ -126,18 +126,18 @@ class OpenPBR(Material):
         priority: int | None = None,
         name: str | None = None,
     ) -> None:
-        given = locals()
+        arguments = locals()
         depth = _amount("transmission_depth", transmission_depth)
         interior = None
         if depth > 0 and not geometry_thin_walled:
-            given["transmission_color"] = 1.0
+            arguments["transmission_color"] = 1.0
             interior = _interior(
                 transmission_color, depth, transmission_scatter, transmission_scatter_anisotropy
             )
         below = scalar("OpenPBR subsurface_weight", subsurface_weight)
         if isinstance(below, BaseTexture) or below > 0:
             warn_caller("OpenPBR: subsurface scattering is approximated by a diffuse surface of its color")
-        layers = OpenPBRBsdf(**{key: given[key] for key in OpenPBRBsdf.defaults if key in given})
+        layers = OpenPBRBsdf(**{key: arguments[key] for key in OpenPBRBsdf.defaults if key in arguments})
         opacity = scalar("OpenPBR geometry_opacity", geometry_opacity)
         if not isinstance(geometry_normal, BaseNormalMap | None):
             wanted = "a NormalMap or a BumpMap"
@@ -167,7 +167,7 @@ def _dispersive(layers: OpenPBRBsdf, scale: float, abbe: float) -> Bsdf:
         return layers
     index, clear = layers.index_inside, layers.transmission_weight
     beside = (getattr(layers, key) for key in BESIDE_GLASS)
-    mixed = any(isinstance(part, BaseTexture) or np.any(part) for part in beside)
+    mixed = any(isinstance(parameter, BaseTexture) or np.any(parameter) for parameter in beside)
     if mixed or isinstance(index, BaseTexture) or isinstance(clear, BaseTexture) or clear != 1:
         warn_caller("OpenPBR: transmission_dispersion_scale is left out where there is more than clear glass")
         return layers

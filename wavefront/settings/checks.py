@@ -86,12 +86,12 @@ def above_zero(name: str, value: Any) -> float:
 
 def check_noise(name: str, value: Any) -> float:
     """Check that a relative error is positive, and warn if it is no less than the picture."""
-    found = above_zero(name, value)
-    if found >= 1:
+    error = above_zero(name, value)
+    if error >= 1:
         warn_caller(
-            f"{name} is {found:g}, a relative error of {100 * found:g} %; {found:g} % is {found / 100:g}"
+            f"{name} is {error:g}, a relative error of {100 * error:g} %; {error:g} % is {error / 100:g}"
         )
-    return found
+    return error
 
 
 def check_quality(name: str, value: Any) -> str:
@@ -178,7 +178,7 @@ def check_preset(name: str, value: Any) -> str | None:
     return value
 
 
-def refuse(given: Mapping[str, Any], reasons: Mapping[str, str]) -> None:
+def refuse(settings: Mapping[str, Any], reasons: Mapping[str, str]) -> None:
     """Check that settings are not among those that were given, and say why they must not be.
 
     Raises
@@ -187,8 +187,8 @@ def refuse(given: Mapping[str, Any], reasons: Mapping[str, str]) -> None:
         If one is.
     """
     for name, why in reasons.items():
-        if given.get(name) is not None:
-            raise SceneError(f"{name} is {in_brief(given[name])}; {why}")
+        if settings.get(name) is not None:
+            raise SceneError(f"{name} is {in_brief(settings[name])}; {why}")
 
 
 @dataclass(frozen=True)
@@ -272,23 +272,23 @@ def check_combinations(values: Mapping[str, Any]) -> None:
         raise SceneError(
             f"aovs has {flows[0]!r}; it needs flow_times=(before, after), times of other pictures, seconds"
         )
-    for each in EXCLUSIONS:
-        if each.refused and asked_for(values, each.one) and asked_for(values, each.other):
-            pair = " does not go with ".join(_in_words(values, name) for name in (each.one, each.other))
-            raise SceneError(f"{pair}: {each.why}")
+    for rule in EXCLUSIONS:
+        if rule.refused and asked_for(values, rule.one) and asked_for(values, rule.other):
+            pair = " does not go with ".join(_in_words(values, name) for name in (rule.one, rule.other))
+            raise SceneError(f"{pair}: {rule.why}")
 
 
 def left_out(values: Mapping[str, Any], name: str) -> bool:
     """Return whether "auto" must leave a setting out, because of what is asked for."""
-    return any(each.one == name and asked_for(values, each.other) for each in _both_ways())
+    return any(rule.one == name and asked_for(values, rule.other) for rule in _both_ways())
 
 
 def _both_ways() -> Iterator[Exclusion]:
     """Yield the exclusions, those that are refused also with their sides exchanged."""
-    for each in EXCLUSIONS:
-        yield each
-        if each.refused:
-            yield Exclusion(each.other, each.one, each.why)
+    for rule in EXCLUSIONS:
+        yield rule
+        if rule.refused:
+            yield Exclusion(rule.other, rule.one, rule.why)
 
 
 def _in_words(values: Mapping[str, Any], name: str) -> str:
@@ -299,9 +299,9 @@ def _in_words(values: Mapping[str, Any], name: str) -> str:
 
 
 def told(name: str) -> str:
-    """Return what the documentation of a setting says of those that do not go with it; nothing is ""."""
-    refused = [each.other for each in _both_ways() if each.refused and each.one == name]
-    unchosen = [each.other for each in EXCLUSIONS if not each.refused and each.one == name]
+    """Return the sentences about the settings that do not go with one, for its documentation; "" if none."""
+    refused = [rule.other for rule in _both_ways() if rule.refused and rule.one == name]
+    unchosen = [rule.other for rule in EXCLUSIONS if not rule.refused and rule.one == name]
     return "".join(
         f" {sentence} {_listed(others)}."
         for sentence, others in (("Not with", refused), ('"auto" leaves it out with', unchosen))
@@ -318,7 +318,7 @@ def _listed(names: Sequence[str]) -> str:
 def table() -> str:
     """Return the table as Markdown: docs/choices.md has it."""
     rows = []
-    for each in EXCLUSIONS:
-        what = "refused" if each.refused else 'left out by "auto"'
-        rows.append(f"| {each.one} | {each.other} | {what} | {each.why} |")
+    for rule in EXCLUSIONS:
+        what = "refused" if rule.refused else 'left out by "auto"'
+        rows.append(f"| {rule.one} | {rule.other} | {what} | {rule.why} |")
     return "\n".join(["| | with | | why |", "|---|---|---|---|", *rows])

@@ -601,7 +601,7 @@ class AllSettings(RenderSettings, total=False):
 
 
 def _declared() -> dict[str, Setting]:
-    """Return what is declared of each setting, by name."""
+    """Return the declaration of each setting, by name."""
     hints = get_type_hints(AllSettings, include_extras=True)
     declared = {
         name: replace(
@@ -652,8 +652,12 @@ def describes_settings(cls: type[C]) -> type[C]:
 
 def settings_signature(signature: inspect.Signature) -> inspect.Signature:
     """Return a signature with a parameter for each setting in place of `**settings`."""
-    own = [each for each in signature.parameters.values() if each.kind is not inspect.Parameter.VAR_KEYWORD]
-    taken = {each.name for each in own}
+    parameters = [
+        parameter
+        for parameter in signature.parameters.values()
+        if parameter.kind is not inspect.Parameter.VAR_KEYWORD
+    ]
+    taken = {parameter.name for parameter in parameters}
     rest = [
         inspect.Parameter(
             name, inspect.Parameter.KEYWORD_ONLY, default=setting.default, annotation=setting.type
@@ -661,7 +665,7 @@ def settings_signature(signature: inspect.Signature) -> inspect.Signature:
         for name, setting in SETTINGS.items()
         if name not in taken
     ]
-    return signature.replace(parameters=[*own, *rest])
+    return signature.replace(parameters=[*parameters, *rest])
 
 
 def described(text: str | None) -> str | None:

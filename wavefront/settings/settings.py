@@ -68,11 +68,11 @@ class Settings:
 
     def __init__(self, **given: Unpack[AllSettings]) -> None:
         self._given: dict[str, Any] = {**given}
-        found: Any = {name: each.default for name, each in SETTINGS.items()}
-        for name, each in SETTINGS.items():
-            if name in given and self._given[name] is not each.default:
-                found[name] = each.checked(name, self._given[name])
-        self.values: AllSettings = found
+        values: Any = {name: setting.default for name, setting in SETTINGS.items()}
+        for name, setting in SETTINGS.items():
+            if name in given and self._given[name] is not setting.default:
+                values[name] = setting.checked(name, self._given[name])
+        self.values: AllSettings = values
         if self.values["denoise"]:
             self.values["aovs"] = chosen_aovs("aovs", (*self.values["aovs"], *GUIDES))
         check_combinations(self.values)
@@ -93,14 +93,14 @@ class Settings:
         """
         for name in first:
             one_of("a setting of the scene", name, SETTINGS)
-        given = {
+        chosen = {
             name: value
             for name, value in self._given.items()
             if value is not None or SETTINGS[name].default is not None
         }
-        skipped = ("spp",) if given.keys() & {"noise", "seconds", "samples"} else ()
-        kept = {name: value for name, value in first.items() if name not in skipped}
-        return Settings(**{**kept, **given}) if kept else self
+        skipped = ("spp",) if chosen.keys() & {"noise", "seconds", "samples"} else ()
+        earlier = {name: value for name, value in first.items() if name not in skipped}
+        return Settings(**{**earlier, **chosen}) if earlier else self
 
     def ending(self, chosen_light: bool) -> Settings:
         """Return these settings with an end of the picture, where none of them says it.
@@ -110,8 +110,8 @@ class Settings:
         chosen_light
             Whether the light of the scene was chosen automatically.
         """
-        given = (self.values[name] for name in ("spp", "noise", "seconds", "samples"))
-        if self.values["quality"] != AUTO or any(each is not None for each in given):
+        limits = (self.values[name] for name in ("spp", "noise", "seconds", "samples"))
+        if self.values["quality"] != AUTO or any(limit is not None for limit in limits):
             return self
         quick = chosen_light and self.values["denoise"] is not False
         end: AllSettings = {"denoise": True, "noise": CLEAN} if quick else {"noise": LITTLE_NOISE}
@@ -126,11 +126,13 @@ class Settings:
 
     def labels(self) -> dict[str, Any]:
         """Return the settings that renders of the same samples have in common; functions by their names."""
-        given: Any = self.values
+        values: Any = self.values
         return {
-            name: _as_in_files(given[name]) if each.choices is None else each.choices.label(given[name])
-            for name, each in SETTINGS.items()
-            if each.identity
+            name: _as_in_files(values[name])
+            if setting.choices is None
+            else setting.choices.label(values[name])
+            for name, setting in SETTINGS.items()
+            if setting.identity
         }
 
     @property

@@ -316,26 +316,26 @@ def _channel(channel: Any) -> Channel | None:
     return channel  # type: ignore[return-value]  # `_pick` knows the names
 
 
-def _stored(channel: int, there: int) -> int:
+def _stored(channel: int, count: int) -> int:
     """Return the stored channel of one of red, green, blue and alpha; `ONE` for alpha that is not stored."""
     if channel == 3:
-        return there - 1 if there in (2, 4) else ONE
-    return channel if there > 2 else 0
+        return count - 1 if count in (2, 4) else ONE
+    return channel if count > 2 else 0
 
 
-def _pick(name: str, channel: Channel | None, there: int) -> tuple[int, ...]:
+def _pick(name: str, channel: Channel | None, count: int) -> tuple[int, ...]:
     """Return the indices of the channels that the texture reads."""
     if channel is None or channel == "luminance":
-        return (0, 1, 2) if there >= 3 else (0,)
-    if not isinstance(channel, int) or not 0 <= channel < there:
+        return (0, 1, 2) if count >= 3 else (0,)
+    if not isinstance(channel, int) or not 0 <= channel < count:
         raise SceneError(
-            f"channel is {channel!r}; texture {name!r} has the channels 0 to {there - 1}, and 'luminance'"
+            f"channel is {channel!r}; texture {name!r} has the channels 0 to {count - 1}, and 'luminance'"
         )
     return (channel,)
 
 
-def _is_alpha(channel: int, there: int) -> bool:
-    return there in (2, 4) and channel == there - 1
+def _is_alpha(channel: int, count: int) -> bool:
+    return count in (2, 4) and channel == count - 1
 
 
 def _table(kind: np.dtype[Any], srgb: bool) -> Floats | None:

@@ -149,7 +149,7 @@ def refractive_indices(name: str, value: Color) -> Any:
     if isinstance(value, BaseTexture | str) or math.prod(shape_of(value)) != 3:
         return refractive_index(name, value)  # type: ignore[arg-type]
     return np.concatenate(
-        [refractive_index(f"{name}[{i}]", each) for i, each in enumerate(np.ravel(value).tolist())]
+        [refractive_index(f"{name}[{i}]", index) for i, index in enumerate(np.ravel(value).tolist())]
     )[:, None]
 
 

@@ -64,8 +64,8 @@ class ClickedPath:
             return
         view = self._viewpoint()
         x, y = (
-            min(max(int(part * side), 0), side - 1)
-            for part, side in zip(event.screen_pos, view.size, strict=True)
+            min(max(int(fraction * side), 0), side - 1)
+            for fraction, side in zip(event.screen_pos, view.size, strict=True)
         )
         try:
             path = self._path_of(view, (x, y))

@@ -75,8 +75,8 @@ class Guard:
             return "this name is not the viewer's own: use its address, or the name that host= has"
         if origins and not _is_origin(origins[0], hosts[0]):
             return "this page is of another site"
-        given = parse_qs(path.partition("?")[2]).get("token", [""])[0]
-        if not secrets.compare_digest(given.encode(), self._token.encode()) and self._token:
+        token = parse_qs(path.partition("?")[2]).get("token", [""])[0]
+        if not secrets.compare_digest(token.encode(), self._token.encode()) and self._token:
             return "the token is missing or wrong: use the address that the viewer printed"
         return None
 
@@ -132,7 +132,7 @@ def is_message(data: Any) -> bool:
 
 @cache
 def _decoder() -> Any:
-    """Return what decodes the messages that a page may send, and nothing else."""
+    """Return the decoder of the messages that a page may send; it refuses all others."""
     from msgspec import defstruct
     from msgspec.msgpack import Decoder
 

@@ -250,7 +250,7 @@ class Page:
     # --- What the page says ---------------------------------------------------------------------------
 
     def _on(self, act: Callable[[Any], object]) -> Callable[[Any], Any]:
-        """Return what viser calls in its event loop, in the order of the messages; bad values are ignored."""
+        """Return the callback of viser's event loop, in the order of the messages; bad values are ignored."""
 
         async def react(event: Any) -> None:
             with suppress(SceneError):
@@ -325,7 +325,7 @@ class Page:
     # --- What the page shows --------------------------------------------------------------------------
 
     def _picture(self) -> bytes | None:
-        """Return what is shown, as a jpg; None if there is nothing yet."""
+        """Return the picture that is shown, as a jpg; None if there is none yet."""
         with self._lock:
             codes = self._codes
         return None if codes is None else png_jpeg.encode(codes, ".jpg", 2.2)
@@ -379,7 +379,7 @@ class Page:
             self._refresh()
 
     def _about(self, frame: ViewerFrame, image: Image) -> str:
-        """Return what the line says of denoising."""
+        """Return the words about denoising for the line below the picture."""
         if DENOISER in image.metadata:
             return f" · denoised at {image.spp} spp" if image.spp < frame.image.spp else " · denoised"
         if self._choice != "denoised":
@@ -427,7 +427,7 @@ def _is_at(camera: Any, view: Viewpoint) -> bool:
 
 
 def _ended(frame: ViewerFrame) -> str:
-    """Return what the line says of a last picture that has ended by itself."""
+    """Return the words about a last picture that has ended by itself."""
     by_itself = frame.final and frame.image.metadata.get("end") is not None
     return f' · quality="reference" takes {DEFAULT_SPP}' if by_itself else ""
 
@@ -465,7 +465,7 @@ def _silence() -> Iterator[None]:
 
 
 def _address(host: str) -> str:
-    """Return what a browser on this machine calls a host."""
+    """Return the address of a host for a browser on this machine."""
     if host in EVERYWHERE:
         return "127.0.0.1"
     return f"[{host}]" if ":" in host else host

@@ -28,7 +28,7 @@ VIEWER_AOVS = tuple(name for names in CHOICES.values() for name in names)
 
 
 def shown_codes(image: Image, choice: str, exposure: float, tone: str = AUTO) -> NDArray[np.uint8]:
-    """Return what a page shows of a picture, (H, W, 3).
+    """Return the pixels of a layer of a picture as a page shows them, (H, W, 3).
 
     Parameters
     ----------

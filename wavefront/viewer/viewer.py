@@ -290,14 +290,14 @@ class Viewer:
         assert self._state is not None
         before = self._shown_state
         while not self._closed.wait(WATCH):
-            found = self._state()
-            if found == before and found != self._shown_state:
+            state = self._state()
+            if state == before and state != self._shown_state:
                 try:
                     self.update()
                 except Exception as error:  # as of a scene that is not complete yet
-                    self._shown_state = found
+                    self._shown_state = state
                     self._fail(error)
-            before = found
+            before = state
 
     def wait(self) -> None:
         """Wait until the viewer is closed, or for Ctrl-C, which closes it."""
