@@ -502,9 +502,9 @@ class Camera(Moving, Answers):
             lens = {"focus": distance} if "focus" in vars(base) and projection is None else {}
         elif up is not None:
             axes = _axes(axes[:, 2], up)
-        given: dict[str, Any] = {"fov": fov, "aperture": aperture, "focus": focus, "shift": shift}
-        given["height"] = height
-        lens |= {name: value for name, value in given.items() if value is not None}
+        parameters: dict[str, Any] = {"fov": fov, "aperture": aperture, "focus": focus, "shift": shift}
+        parameters["height"] = height
+        lens |= {name: value for name, value in parameters.items() if value is not None}
         chosen = base.replaced(**lens) if lens else base
         window = self.window if size is None and crop is None else crop
         camera = Camera(eye, axes, chosen, self.resolution if size is None else size, window)
@@ -576,9 +576,9 @@ class Camera(Moving, Answers):
         >>> dolly.at(1).origin.tolist()
         [0.5, 0.0, 4.0]
         """
-        own = self.to_matrix() if self.motion is None else self.motion
+        placement = self.to_matrix() if self.motion is None else self.motion
         moving = matrix if isinstance(matrix, Motion) else finite_array("Camera transform", matrix, (4, 4))
-        placing = product(moving, own)
+        placing = product(moving, placement)
         if isinstance(placing, Motion):
             camera = self._placed_by(placing.at(placing.start))
             camera.motion = placing
@@ -627,13 +627,13 @@ class Camera(Moving, Answers):
         columns, left = _rescaled(self.resolution[0], (x0 + x1) / 2, scale, width)
         rows, top = _rescaled(self.resolution[1], (y0 + y1) / 2, scale, height)
         crop = left, top, left + width, top + height
-        part = Camera(self.origin, self.rotation, self.projection, (columns, rows), crop)
-        return self._carrying(part, self.motion, self.course)
+        camera = Camera(self.origin, self.rotation, self.projection, (columns, rows), crop)
+        return self._carrying(camera, self.motion, self.course)
 
     def cropped(self, crop: Window) -> Camera:
         """Return the same camera that renders only the window (x0, y0, x1, y1) of the whole picture."""
-        part = Camera(self.origin, self.rotation, self.projection, self.resolution, crop)
-        return self._carrying(part, self.motion, self.course)
+        camera = Camera(self.origin, self.rotation, self.projection, self.resolution, crop)
+        return self._carrying(camera, self.motion, self.course)
 
     def _carrying(
         self,
@@ -767,7 +767,7 @@ class Camera(Moving, Answers):
         return None
 
     def metadata(self) -> Mapping[str, Any]:
-        """Return what the metadata of the picture say of the camera beside its size."""
+        """Return the entries of the picture's metadata about the camera, other than its size."""
         return {"rolling_shutter": self.rolling_shutter} if self.rolling_shutter else {}
 
     def row_delay(self, pixel: Words) -> Doubles:
@@ -914,7 +914,7 @@ class Camera(Moving, Answers):
         return np.ascontiguousarray(pixels.T) - to_film, depth
 
     def project_at(self, points: Doubles, times: Doubles) -> tuple[Doubles, Doubles]:
-        """Return what `project` does of points (n, 3), for the camera as it is at times (n,), seconds."""
+        """Return pixels and depths of points (n, 3) as `project`, for the camera of times (n,), seconds."""
         if self.motion is None:
             return self.project(points)
         poses = upright(self.motion.at_times(times))
@@ -985,7 +985,7 @@ def _calibration(K: ArrayLike, size: tuple[int, int], pixel_centers: str) -> tup
 
 
 def _to_film(pixel_centers: str) -> float:
-    """Return what is added to pixel coordinates with these centers to get film positions."""
+    """Return the offset from pixel coordinates with these centers to film positions."""
     return CENTERS[one_of("pixel_centers", pixel_centers, tuple(CENTERS))]
 
 

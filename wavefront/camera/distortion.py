@@ -40,26 +40,26 @@ class Distortion:
 
     def __init__(self, coefficients: ArrayLike) -> None:
         try:
-            given = np.asarray(coefficients, np.float64).ravel()
+            numbers = np.asarray(coefficients, np.float64).ravel()
         except (TypeError, ValueError) as error:
             raise SceneError(f"distortion must be numeric, got {coefficients!r}") from error
-        if given.size not in COUNTS:
+        if numbers.size not in COUNTS:
             raise SceneError(
-                f"distortion has {plural(given.size, 'number')}; it must have 4, 5 or 8: {', '.join(NAMES)}"
+                f"distortion has {plural(numbers.size, 'number')}; it must have 4, 5 or 8: {', '.join(NAMES)}"
             )
-        if not np.isfinite(given).all():
-            raise SceneError(f"distortion is {given.tolist()}; it must be finite")
-        if given[8:].any():
+        if not np.isfinite(numbers).all():
+            raise SceneError(f"distortion is {numbers.tolist()}; it must be finite")
+        if numbers[8:].any():
             raise SceneError(
-                f"distortion[8:] is {given[8:].tolist()}; thin prisms and tilted sensors are not supported"
+                f"distortion[8:] is {numbers[8:].tolist()}; thin prisms and tilted sensors are not supported"
             )
         self.coefficients = np.zeros(8)
-        self.coefficients[: min(given.size, 8)] = given[:8]
+        self.coefficients[: min(numbers.size, 8)] = numbers[:8]
 
     def __repr__(self) -> str:
         """Name the coefficients that are not 0."""
-        there = zip(NAMES, self.coefficients, strict=True)
-        return f"Distortion({', '.join(f'{name}={value:g}' for name, value in there if value)})"
+        named = zip(NAMES, self.coefficients, strict=True)
+        return f"Distortion({', '.join(f'{name}={value:g}' for name, value in named if value)})"
 
     def apply(self, x: Doubles, y: Doubles) -> tuple[Doubles, Doubles]:
         """Return the distorted coordinates of points (n,), (n,) each."""

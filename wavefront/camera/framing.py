@@ -63,17 +63,17 @@ class _Side:
         return offset + tangent * depth
 
 
-def _middle(one: _Side, other: _Side, tangent: float, distance: float) -> float:
+def _middle(side: _Side, other: _Side, tangent: float, distance: float) -> float:
     """Return the offset from which things reach as far to both sides, at a distance."""
     narrow = 0.0
     for _ in range(STEPS):  # for the tangent at which both planes meet at that distance
-        (a, depth_a), (b, depth_b) = one.touching(narrow), other.touching(narrow)
+        (a, depth_a), (b, depth_b) = side.touching(narrow), other.touching(narrow)
         room = distance - (depth_a + depth_b) / 2
         if not (a + b > 0 and room > 0):
             break
         narrow = min(tangent, (a + b) / 2 / room)
-    middle = (one.reach(narrow) - other.reach(narrow)) / 2
-    least, most = one.reach(tangent) - tangent * distance, tangent * distance - other.reach(tangent)
+    middle = (side.reach(narrow) - other.reach(narrow)) / 2
+    least, most = side.reach(tangent) - tangent * distance, tangent * distance - other.reach(tangent)
     return min(max(middle, least), max(most, least))
 
 
@@ -104,6 +104,6 @@ def turned_balls(balls: Balls, axes: Doubles) -> Balls:
     _, inner = sin_cos_turns(np.float64(0.5 / SIDES))
     circles = np.repeat(widest[used] / inner, 2)[:, None]
     levels = np.stack([lowest[used], highest[used]], 1).reshape(-1, 1)
-    own = np.stack(np.broadcast_arrays(circles * sin, levels, circles * cos)).reshape(3, -1)
-    points = np.stack([own[0] * x + own[1] * y + own[2] * z for x, y, z in axes], 1)
+    local = np.stack(np.broadcast_arrays(circles * sin, levels, circles * cos)).reshape(3, -1)
+    points = np.stack([local[0] * x + local[1] * y + local[2] * z for x, y, z in axes], 1)
     return points, np.zeros(len(points))

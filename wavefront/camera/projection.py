@@ -137,8 +137,8 @@ class Projection(Parametrized, ABC):
             If not.
         """
         width, height = size
-        parts = np.linspace(0, 1, CHECKED + 2)[1:-1]
-        x, y = (each.ravel().astype(f4) for each in np.meshgrid(parts * width, parts * height))
+        fractions = np.linspace(0, 1, CHECKED + 2)[1:-1]
+        x, y = (grid.ravel().astype(f4) for grid in np.meshgrid(fractions * width, fractions * height))
         seen = _checked_rays(self, x, y, size)
         pixels, depth = self.project(seen, size)
         name = type(self).__name__
@@ -167,9 +167,11 @@ def _checked_rays(projection: Projection, x: Floats, y: Floats, size: Size) -> D
     """
     offset, direction = projection.rays(x, y, size, None)
     name, shapes = type(projection).__name__, ((3, len(x)), (3, 1))
-    for what, each in (("origins", offset), ("directions", direction)):
-        if each is not None and np.shape(each) not in shapes:
-            raise SceneError(f"{name}.rays returns {what} of shape {np.shape(each)}; it must be {shapes[0]}")
+    for what, vectors in (("origins", offset), ("directions", direction)):
+        if vectors is not None and np.shape(vectors) not in shapes:
+            raise SceneError(
+                f"{name}.rays returns {what} of shape {np.shape(vectors)}; it must be {shapes[0]}"
+            )
     toward = np.broadcast_to(np.asarray(direction, np.float64), shapes[0])
     lost = ~(np.isfinite(toward).all(0) & toward.any(0))
     if lost.any() and (projection.sees_all or not np.isnan(toward[:, lost]).all()):

@@ -66,15 +66,15 @@ class Sensors(Camera):
             return np.broadcast_to((0.0, 0.0, 1.0), shape)
         if directions is None:
             raise SceneError(f"{self.sensor} needs {name}: (n, 3), or (3,) for all points")
-        given = finite_array(name, directions, (3,) if as_array(name, directions).ndim == 1 else shape)
-        length = np.linalg.norm(given, axis=-1, keepdims=True)
+        vectors = finite_array(name, directions, (3,) if as_array(name, directions).ndim == 1 else shape)
+        length = np.linalg.norm(vectors, axis=-1, keepdims=True)
         bad = np.flatnonzero(~(length > 0))
         if bad.size:
             raise SceneError(f"{name}[{bad[0]}] is zero; it must have a direction")
-        return np.broadcast_to(given / length, shape)
+        return np.broadcast_to(vectors / length, shape)
 
     def __repr__(self) -> str:
-        """Return what is measured, and at how many points."""
+        """Return the kind of light that is measured, and the number of points."""
         return f"<Sensors: {self.sensor} at {len(self.points)} points>"
 
     @property
@@ -104,10 +104,10 @@ class Sensors(Camera):
         width, rows = self.resolution
         spare = np.full((width * rows - len(self.points), 3), np.nan)
         both = {"position": self.points, "normal": self.directions}
-        return {name: np.concatenate([each, spare]).reshape(rows, width, 3) for name, each in both.items()}
+        return {name: np.concatenate([table, spare]).reshape(rows, width, 3) for name, table in both.items()}
 
     def metadata(self) -> Mapping[str, Any]:
-        """Return what the metadata of the picture say of the sensors."""
+        """Return the entries of the picture's metadata about the sensors."""
         return {"sensor": self.sensor, "points": len(self.points)}
 
     def scaled(self, factor: float) -> Self:

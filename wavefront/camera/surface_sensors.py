@@ -72,18 +72,18 @@ class SurfaceSensors(Sensors):
         return self.triangles.reshape(-1, 3)
 
     def layers(self) -> dict[str, NDArray[Any]]:
-        """Return the middles, and as "scale" what makes power of the values of pixels, m²·sr or m²."""
-        found = super().layers()
+        """Return the middles, and as "scale" the factors from the values of pixels to power, m²·sr or m²."""
+        layers = super().layers()
         if self._kind == "irradiance":
-            return found
-        scale = np.full(found["position"].shape[0] * found["position"].shape[1], np.nan)
+            return layers
+        scale = np.full(layers["position"].shape[0] * layers["position"].shape[1], np.nan)
         scale[: self.areas.size] = self.areas * (np.pi if self.sensor == "radiance" else 1)
-        return {**found, "scale": scale.reshape(found["position"].shape[:2])}
+        return {**layers, "scale": scale.reshape(layers["position"].shape[:2])}
 
     def metadata(self) -> Mapping[str, Any]:
-        """Return what the metadata of the picture say of the sensors."""
-        found = super().metadata()
-        return found if self._kind == "irradiance" else {**found, "sensor": f"{self._kind} flux"}
+        """Return the entries of the picture's metadata about the sensors."""
+        metadata = super().metadata()
+        return metadata if self._kind == "irradiance" else {**metadata, "sensor": f"{self._kind} flux"}
 
     def scaled(self, factor: float) -> Self:
         """Return the same sensors in a scene whose lengths were multiplied by `factor`; areas stay."""

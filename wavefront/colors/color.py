@@ -36,7 +36,7 @@ def named_color(name: str, text: str) -> Floats:
     if len(digits) == 3:
         digits = "".join(2 * digit for digit in digits)
     if len(digits) != 6 or not HEX.issuperset(digits):
-        near = [repr(each) for each in get_close_matches(word, CSS_COLORS, MOST_HINTS)]
+        near = [repr(color_name) for color_name in get_close_matches(word, CSS_COLORS, MOST_HINTS)]
         hint = f"; the nearest names are {', '.join(near)}" if near else ""
         raise SceneError(
             f"{name} is {in_brief(text)}, which is no color; "
@@ -117,15 +117,15 @@ def srgb(*color: Any) -> Floats:
     names = named_rows("srgb color", value)
     if names is not None:
         return names
-    given = as_array("srgb color", value)
-    array = finite_array("srgb color", given, (None,) * given.ndim)
+    raw = as_array("srgb color", value)
+    array = finite_array("srgb color", raw, (None,) * raw.ndim)
     if array.ndim == 0:
         array = np.broadcast_to(array, 3)
     if array.shape[-1] not in (3, 4):
         raise SceneError(f"srgb color must have shape (..., 3) or (..., 4), got {array.shape}")
     values = array.astype(f4)
-    if given.dtype in CODES:
-        values /= f4(np.iinfo(given.dtype).max)
+    if raw.dtype in CODES:
+        values /= f4(np.iinfo(raw.dtype).max)
     bad = np.argwhere(~((values >= 0) & (values <= 1)))
     if len(bad):
         where = "".join(f"[{i}]" for i in bad[0])
@@ -143,9 +143,9 @@ def named_rows(name: str, value: Any) -> Floats | None:
         return None
     if not isinstance(value, list | tuple | np.ndarray) or not len(value):
         return None
-    if not all(isinstance(each, str) for each in value):
+    if not all(isinstance(color_name, str) for color_name in value):
         return None
-    return np.stack([named_color(f"{name}[{i}]", each) for i, each in enumerate(value)])
+    return np.stack([named_color(f"{name}[{i}]", color_name) for i, color_name in enumerate(value)])
 
 
 def _plain(text: str) -> str:

@@ -26,10 +26,10 @@ def warn_of_colormap(name: str, colors: NDArray[Any]) -> None:
         return
     some = colors[np.linspace(0, len(colors) - 1, MOST_ROWS).astype(np.intp), :3].astype(f4)
     rows = {row.tobytes() for row in some if ((row != 0) & (row != 1)).any()}
-    found = next((label for label, table in _tables().items() if rows <= table), None)
-    if len(rows) > 1 and found is not None:
+    match = next((label for label, table in _tables().items() if rows <= table), None)
+    if len(rows) > 1 and match is not None:
         warn_caller(
-            f"{name} are those of matplotlib's colormap {found!r}, which are sRGB, but floats are taken as "
+            f"{name} are those of matplotlib's colormap {match!r}, which are sRGB, but floats are taken as "
             "linear; give colors=wf.srgb(...)"
         )
 

@@ -104,7 +104,7 @@ def numeric(name: str, values: ArrayLike) -> Doubles:
 
 def _table(cmap: Any) -> NDArray[np.uint8]:
     if isinstance(cmap, list | tuple | np.ndarray):
-        colors = np.atleast_2d([_codes(each) for each in cmap])
+        colors = np.atleast_2d([_codes(color) for color in cmap])
         return np.concatenate([colors, np.full((len(colors), 4 - colors.shape[1]), 255)], 1).astype(np.uint8)
     cmap = DEFAULT_MAP if cmap is None else cmap
     if isinstance(cmap, str):
@@ -120,7 +120,7 @@ def _named(cmap: str) -> Any:
     except ImportError as error:
         raise ImportError("colormaps need matplotlib: pip install matplotlib") from error
     if cmap not in colormaps:
-        near = [repr(each) for each in get_close_matches(cmap, list(colormaps), MOST_HINTS)]
+        near = [repr(name) for name in get_close_matches(cmap, list(colormaps), MOST_HINTS)]
         hint = f"; the nearest names are {', '.join(near)}" if near else ""
         raise SceneError(f"cmap is {cmap!r}, which is no colormap of matplotlib{hint}")
     return colormaps[cmap]

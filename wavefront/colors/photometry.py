@@ -45,9 +45,9 @@ class Photometric(np.ndarray[Any, Any]):
 
 def photometric(values: NDArray[Any], efficacy: float) -> Photometric:
     """Return RGB (...) that were given with an efficacy, lm/W."""
-    found = values.view(Photometric)
-    found.efficacy = efficacy
-    return found
+    photometric_view = values.view(Photometric)
+    photometric_view.efficacy = efficacy
+    return photometric_view
 
 
 @suggests_keywords
@@ -170,8 +170,8 @@ def exposure(
     if (ev100 is None) == (f_number is None and shutter is None):
         raise SceneError("exposure needs ev100, or f_number and shutter, and not both")
     if ev100 is None:
-        given = {"f_number": f_number, "shutter": shutter}
-        n, t = (number(f"exposure {k}", v, lambda x: x > 0, "above 0") for k, v in given.items())
+        optics = {"f_number": f_number, "shutter": shutter}
+        n, t = (number(f"exposure {k}", v, lambda x: x > 0, "above 0") for k, v in optics.items())
         ev100 = math.log2(n * n / t * 100 / speed)
     return math.log2(_efficacy(efficacy) / WHITE) - number("exposure ev100", ev100)
 

@@ -32,7 +32,7 @@ def rgb_to_xyz(primaries: ArrayLike) -> Doubles:
 
 def to_srgb(primaries: ArrayLike) -> Doubles:
     """Return the matrix (3, 3) from linear RGB of some primaries to linear sRGB; white becomes white."""
-    own, ours = rgb_to_xyz(primaries), rgb_to_xyz(REC_709)
-    cones = (BRADFORD @ ours.sum(1)) / (BRADFORD @ own.sum(1))
+    source, target = rgb_to_xyz(primaries), rgb_to_xyz(REC_709)
+    cones = (BRADFORD @ target.sum(1)) / (BRADFORD @ source.sum(1))
     adapted = np.linalg.solve(BRADFORD, cones[:, None] * BRADFORD)
-    return np.asarray(np.linalg.solve(ours, adapted @ own))
+    return np.asarray(np.linalg.solve(target, adapted @ source))

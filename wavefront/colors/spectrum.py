@@ -57,8 +57,8 @@ def spectrum_rgb(pairs: Sequence[tuple[float, float]], *, emission: bool, bounde
     SceneError
         If there are fewer than two values, or the wavelengths do not rise.
     """
-    given = finite_array("spectrum", pairs, (None, 2))
-    at, values = given.T
+    rows = finite_array("spectrum", pairs, (None, 2))
+    at, values = rows.T
     if len(at) < 2 or not (np.diff(at) > 0).all():
         raise SceneError("spectrum needs at least two values, whose wavelengths rise")
     wave = np.linspace(FIRST, FIRST + STEP * (len(X) - 1), 2001)
@@ -67,7 +67,7 @@ def spectrum_rgb(pairs: Sequence[tuple[float, float]], *, emission: bool, bounde
     if not emission:
         light = light * np.interp(wave, table, D65) / D65_SCALE
     step = (wave[1] - wave[0]) / Y_INTEGRAL
-    xyz = np.array([(np.interp(wave, table, each) * light).sum() * step for each in (X, Y, Z)])
+    xyz = np.array([(np.interp(wave, table, matching) * light).sum() * step for matching in (X, Y, Z)])
     return np.clip(TO_RGB @ xyz, 0, 1 if bounded else None)
 
 
@@ -79,14 +79,14 @@ def reflectance_weights(wavelengths: Doubles) -> Doubles:
     table = np.arange(len(X)) * STEP + float(FIRST)
     place = np.clip(np.searchsorted(wavelengths, table) - 1, 0, max(len(wavelengths) - 2, 0))
     start, end = wavelengths[place], wavelengths[np.minimum(place + 1, len(wavelengths) - 1)]
-    part = (table - start) / np.where(end > start, end - start, 1)
+    fraction = (table - start) / np.where(end > start, end - start, 1)
     weight = np.stack([row[0] * X + row[1] * Y + row[2] * Z for row in TO_RGB]) * D65
     weight /= weight.sum(1, keepdims=True)
     weight = np.where((table >= wavelengths[0]) & (table <= wavelengths[-1]), weight, 0)
     out = np.zeros((3, len(wavelengths)))
     for channel in range(3):
-        np.add.at(out[channel], place, weight[channel] * (1 - part))
-        np.add.at(out[channel], np.minimum(place + 1, len(wavelengths) - 1), weight[channel] * part)
+        np.add.at(out[channel], place, weight[channel] * (1 - fraction))
+        np.add.at(out[channel], np.minimum(place + 1, len(wavelengths) - 1), weight[channel] * fraction)
     return out
 
 
@@ -130,5 +130,5 @@ def blackbody_colors(temperature: NDArray[Any]) -> Doubles:
     if most <= COLDEST:
         return np.zeros((*temperature.shape, 3))
     kelvin = np.linspace(COLDEST, most, TABULATED)
-    colors = np.array([blackbody(each) for each in kelvin]) * Y_INTEGRAL
+    colors = np.array([blackbody(temperature) for temperature in kelvin]) * Y_INTEGRAL
     return np.stack([np.interp(temperature, kelvin, row, left=0) for row in colors.T], -1)

@@ -35,8 +35,8 @@ class FileMoments:
     def __init__(self, read: Callable[[float], Scene], span: tuple[float, float], scene: Scene) -> None:
         self._read, self.span = read, span
         self._shapes, self._lights, self._camera = list(scene.shapes), list(scene.lights), scene.camera
-        parts: list[Any] = [*self._shapes, *self._lights]
-        self._known = {key: each for each in parts if (key := _made_of(each)) is not None}
+        elements: list[Any] = [*self._shapes, *self._lights]
+        self._known = {key: element for element in elements if (key := _made_of(element)) is not None}
         self._samples: list[Scene] = []
 
     def samples(self, scene: Scene) -> list[Scene]:
@@ -51,18 +51,18 @@ class FileMoments:
         What has not changed is the object of the scene itself, with its textures and tables.
         """
         fresh = self._read(time)
-        mine = {id(each) for each in (*self._shapes, *self._lights)}  # not kept: a copy has other ids
-        shapes = [self._known.get(_made_of(each) or "", each) for each in fresh.shapes]
-        lights = [self._known.get(_made_of(each) or "", each) for each in fresh.lights]
-        shapes += [each.at(time) for each in scene.shapes if id(each) not in mine]
-        lights += [each.at(time) for each in scene.lights if id(each) not in mine]
-        own = scene.camera is self._camera
-        return shapes, lights, fresh.camera if own else scene.camera and scene.camera.at(time)
+        mine = {id(element) for element in (*self._shapes, *self._lights)}  # not kept: a copy has other ids
+        shapes = [self._known.get(_made_of(shape) or "", shape) for shape in fresh.shapes]
+        lights = [self._known.get(_made_of(light) or "", light) for light in fresh.lights]
+        shapes += [shape.at(time) for shape in scene.shapes if id(shape) not in mine]
+        lights += [light.at(time) for light in scene.lights if id(light) not in mine]
+        is_of_file = scene.camera is self._camera
+        return shapes, lights, fresh.camera if is_of_file else scene.camera and scene.camera.at(time)
 
 
-def _made_of(part: Shape | Light) -> str | None:
-    """Return what differs between shapes or lights that differ; None where that cannot be said."""
+def _made_of(element: Shape | Light) -> str | None:
+    """Return a fingerprint of a shape or a light; None where it has none."""
     try:
-        return fingerprint("a part of a file", part)
+        return fingerprint("a part of a file", element)
     except SceneError:
         return None

@@ -56,12 +56,12 @@ class SoftBox:
         ahead = np.array([across * level, high, along * level])
         depth = np.tensordot(ahead, directions, 1)
         in_front = depth > 1e-3
-        part = in_front.astype(float)
+        factor = in_front.astype(float)
         for axis, size in ((right, self.width), (np.cross(ahead, right), self.height)):
             sin, cos = sin_cos_turns(np.float64(size / 720))
             offset = np.abs(np.tensordot(axis, directions, 1)) / np.where(in_front, depth, 1)
-            part *= smoothstep((1 - offset * cos / sin) / self.feather)
-        return part[:, :, None] * np.array(self.radiance)
+            factor *= smoothstep((1 - offset * cos / sin) / self.feather)
+        return factor[:, :, None] * np.array(self.radiance)
 
 
 @soa

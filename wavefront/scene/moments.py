@@ -30,7 +30,7 @@ class Moments:
         self._key = _identity(shapes)
         self._shapes = self._key[0]
         motions, forms = self._key[-2:]
-        still = all(each is None for each in motions) and all(each is None for each in forms)
+        still = all(motion is None for motion in motions) and all(motion is None for motion in forms)
         moving = [] if still else [number for number, shape in enumerate(shapes) if shape.moves]
         placed = [number for number in moving if isinstance(shapes[number], Instance)]
         self.carried = [number for number in placed if shapes[number].motion is not None]
@@ -52,7 +52,7 @@ class Moments:
     def at(self, time: float) -> list[Shape]:
         """Return the shapes at a time; those that a motion flattens to nothing are left out."""
         shapes: list[Any] = list(self._shapes)
-        deforming = {id(each): each for each in self._key[1] if each is not None and each.moves}
+        deforming = {id(mesh): mesh for mesh in self._key[1] if mesh is not None and mesh.moves}
         forms = {number: mesh.at(time) for number, mesh in deforming.items()}
         for number in self.others:
             shape = shapes[number]
@@ -71,13 +71,13 @@ class Moments:
 
 
 def _identity(shapes: Sequence[Shape]) -> list[list[Any]]:
-    """Return what differs once other shapes are there, or one has another mesh or motion, or another form."""
+    """Return lists that differ once a shape is replaced, or has another mesh, motion or form."""
     values: list[dict[str, Any]] = list(map(vars, shapes))
-    meshes = list(dict.fromkeys([each.get("mesh") for each in values]))
-    own = [each.get("mesh") for each in values] if len(meshes) > 2 else []
-    formed = [each.get("deformation") for each in values if "mesh" not in each]
+    meshes = list(dict.fromkeys([attributes.get("mesh") for attributes in values]))
+    mesh_of = [attributes.get("mesh") for attributes in values] if len(meshes) > 2 else []
+    formed = [attributes.get("deformation") for attributes in values if "mesh" not in attributes]
     formed += [vars(mesh).get("deformation") for mesh in meshes if mesh is not None]
-    return [list(shapes), meshes, own, [each.get("motion") for each in values], formed]
+    return [list(shapes), meshes, mesh_of, [attributes.get("motion") for attributes in values], formed]
 
 
 def _flattens(matrices: Doubles) -> Bools:

@@ -259,7 +259,7 @@ class Scene(Answers):
     @property
     def moves(self) -> bool:
         """Whether a shape, a light or the camera moves or deforms."""
-        return self.file_moments is not None or any(each.moves for each in self._seen) or self._moving.any
+        return self.file_moments is not None or any(seen.moves for seen in self._seen) or self._moving.any
 
     @property
     def _seen(self) -> list[Moving]:
@@ -267,7 +267,7 @@ class Scene(Answers):
         return [*self.lights, *([] if self.camera is None else [self.camera])]
 
     def _span(self) -> tuple[float, float]:
-        spans = [*self._moving.spans, *(each.time_span for each in self._seen if each.moves)]
+        spans = [*self._moving.spans, *(seen.time_span for seen in self._seen if seen.moves)]
         spans += [] if self.file_moments is None else [self.file_moments.span]
         return min(span[0] for span in spans or [(0.0, 0.0)]), max(span[1] for span in spans or [(0.0, 0.0)])
 
@@ -297,7 +297,7 @@ class Scene(Answers):
         [0.0, 1.0, 0.0]
         """
         time, moving = number("time", time), self._moving
-        if not (moving.any or self.file_moments is not None or any(each.moves for each in self._seen)):
+        if not (moving.any or self.file_moments is not None or any(seen.moves for seen in self._seen)):
             return self
         if self.file_moments is not None:
             shapes, lights, camera = self.file_moments.at(self, time)
@@ -310,7 +310,7 @@ class Scene(Answers):
         moment._shapes, moment._lights = _checked(Shapes, shapes), _checked(Lights, lights)
         moment._camera = camera
         if self.has_lights_of_file:
-            moment.lights_of_file = [id(each) for each in moment._lights]
+            moment.lights_of_file = [id(light) for light in moment._lights]
         moment.moment, moment._whole, moment._moments, moment.file_moments = time, self, None, None
         return moment
 
@@ -341,7 +341,7 @@ class Scene(Answers):
         if not source._moving.any and source.file_moments is None:
             return self.bounds
         if source._reach is None:
-            boxes = np.stack([each.bounds for each in self._samples])
+            boxes = np.stack([moment.bounds for moment in self._samples])
             source._reach = np.stack([boxes[:, 0].min(0), boxes[:, 1].max(0)])
         return source._reach
 
@@ -358,14 +358,14 @@ class Scene(Answers):
     @property
     def has_lights_of_file(self) -> bool:
         """True if it was read from a file that need not say all of the light, and has its lights."""
-        return self.lights_of_file is not None and self.lights_of_file == [id(each) for each in self.lights]
+        return self.lights_of_file is not None and self.lights_of_file == [id(light) for light in self.lights]
 
     @property
     def emits(self) -> bool:
         """True if the scene has any light, also of a medium that glows."""
         media = [self.medium, *(shape.material.interior for shape in self.shapes)]
         shines = any(shape.emission is not None for shape in self.shapes)
-        return bool(self.lights) or shines or any(each.glows for each in media if each is not None)
+        return bool(self.lights) or shines or any(medium.glows for medium in media if medium is not None)
 
     @suggests_keywords
     def framing_camera(
@@ -452,15 +452,15 @@ class Scene(Answers):
 
     def _hull(self) -> Balls:
         """Return balls whose convex hull holds all shapes, at all times."""
-        centers, radii = zip(*(each._hull_now() for each in self._samples), strict=True)
+        centers, radii = zip(*(moment._hull_now() for moment in self._samples), strict=True)
         return np.concatenate(centers), np.concatenate(radii)
 
     def _hull_now(self) -> Balls:
-        found = [shape.hull() for shape in self.shapes if not isinstance(shape, Instance)]
+        hulls = [shape.hull() for shape in self.shapes if not isinstance(shape, Instance)]
         instances = [shape for shape in self.shapes if isinstance(shape, Instance)]
-        found += [(points, np.zeros(len(points))) for points in instance_hulls(instances)]
-        return np.concatenate([centers for centers, _ in found]), np.concatenate(
-            [radii for _, radii in found]
+        hulls += [(points, np.zeros(len(points))) for points in instance_hulls(instances)]
+        return np.concatenate([centers for centers, _ in hulls]), np.concatenate(
+            [radii for _, radii in hulls]
         )
 
 
@@ -581,14 +581,14 @@ class CheckedList(list[T], ABC):
         if isinstance(items, str | dict) or not isinstance(items, Iterable):
             hint = self.hint(items)
             raise SceneError(f"{self.name} must be a list of {self.allowed}, got {in_brief(items)}{hint}")
-        found: list[T] = []
+        checked: list[T] = []
         for at, item in enumerate(items, first):
             elements = self.converted(item)
             if elements is None:
                 what, hint = in_brief(item), self.hint(item)
                 raise SceneError(f"{self.name}[{at}] is {what}; it must be one of {self.allowed}{hint}")
-            found += elements
-        return found
+            checked += elements
+        return checked
 
 
 class Shapes(CheckedList[Shape]):
@@ -636,9 +636,9 @@ class Lights(CheckedList[Light]):
 
 def _checked(kind: type[C], items: Iterable[Any]) -> C:
     """Return a list whose elements have been checked."""
-    found = kind.__new__(kind)
-    list.extend(found, items)
-    return found
+    checked = kind.__new__(kind)
+    list.extend(checked, items)
+    return checked
 
 
 def _check_environments(lights: Sequence[Light]) -> None:

@@ -20,13 +20,13 @@ PARTS = (Parametrized, Shape, Light, BaseMedium, BaseTexture, Camera)
 
 
 def scene_state(scene: Scene) -> Any:
-    """Return what differs once an object of a scene has been changed or replaced.
+    """Return the state of a scene, which differs once an object of it has been changed or replaced.
 
     Elements of large arrays are not looked at.
     """
     seen: dict[int, Any] = {}
-    parts = [*scene.shapes, *scene.lights, scene.medium]
-    return [id(each) for each in parts], [_state(each, seen) for each in parts], list(seen)
+    elements = [*scene.shapes, *scene.lights, scene.medium]
+    return [id(element) for element in elements], [_state(element, seen) for element in elements], list(seen)
 
 
 def _state(value: Any, seen: dict[int, Any]) -> Any:
@@ -35,9 +35,11 @@ def _state(value: Any, seen: dict[int, Any]) -> Any:
     if isinstance(value, str | bytes | int | float | bool | None):
         return value
     if isinstance(value, tuple | list):
-        return [_state(each, seen) for each in value[:FEW]], len(value)
+        return [_state(element, seen) for element in value[:FEW]], len(value)
     if not isinstance(value, PARTS) or id(value) in seen:
         return id(value)
     seen[id(value)] = value
-    found = {name: each for name, each in vars(value).items() if name in GIVEN or not name.startswith("_")}
-    return [(name, _state(each, seen)) for name, each in found.items()]
+    attributes = {
+        name: field for name, field in vars(value).items() if name in GIVEN or not name.startswith("_")
+    }
+    return [(name, _state(field, seen)) for name, field in attributes.items()]

@@ -89,9 +89,9 @@ def sun_position(
             f"sun_position: the time {times[0]} has no zone and is taken for UTC; write {times[0]}+00:00 if "
             "it is, or the zone of the place, such as +02:00"
         )
-    found = get_solarposition(times, *place)
+    position = get_solarposition(times, *place)
     (high, level), (across, along) = (
-        sin_cos_turns(found[name].to_numpy() / 360) for name in ("apparent_elevation", "azimuth")
+        sin_cos_turns(position[name].to_numpy() / 360) for name in ("apparent_elevation", "azimuth")
     )
     sun = np.outer(high, zenith) + np.outer(level * along, toward_north) + np.outer(level * across, east)
     return sun[0] if np.ndim(time) == 0 else sun

@@ -40,7 +40,7 @@ class Attribute:
 
     title: str  # for messages
     default: tuple[float, ...]  # value of a mesh without it, everywhere
-    given: Callable[[Mesh], Doubles | None]  # the user's array for it
+    array_of: Callable[[Mesh], Doubles | None]  # the user's array for it
     corners: Callable[[Mesh], Doubles]  # (m, 3, width), if the mesh has it
     on_curved: Callable[[CurvedSurfaces, Ints, Floats], Floats]  # at points of primitives: (width, n)
     vectors: bool = False  # whether these are vectors of three numbers each, which instances transform
@@ -81,15 +81,15 @@ def _curved_color(surfaces: CurvedSurfaces, prim: Ints, point: Floats) -> Floats
 def _per_vertex(
     title: str,
     default: tuple[float, ...],
-    given: Callable[[Mesh], Doubles | None],
+    array_of: Callable[[Mesh], Doubles | None],
     on_curved: Callable[[CurvedSurfaces, Ints, Floats], Floats],
 ) -> Attribute:
     def corners(mesh: Mesh) -> Doubles:
-        values = given(mesh)
+        values = array_of(mesh)
         assert values is not None
         return values[mesh.faces]
 
-    return Attribute(title, default, given, corners, on_curved)
+    return Attribute(title, default, array_of, corners, on_curved)
 
 
 UV, UV1 = "texture coordinates (uvs)", "second texture coordinates (uvs1)"
@@ -126,7 +126,7 @@ def corner_values(name: str, meshes: Sequence[Mesh]) -> Corners:
     start = 0
     for mesh in meshes:
         end = start + len(mesh.faces)
-        if attribute.given(mesh) is None:
+        if attribute.array_of(mesh) is None:
             corners[:, :, start:end] = np.array(attribute.default).reshape(1, width, 1)
         else:
             corners[:, :, start:end] = attribute.corners(mesh).transpose(1, 2, 0)

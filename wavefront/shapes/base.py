@@ -233,9 +233,9 @@ class Shape(Moving, Answers, ABC):
         [[1.0, -1.0, -1.0], [3.0, 1.0, 1.0]]
         """
         if shape_of(factor) == ():
-            one = number(f"{self.name}: factor", factor, lambda x: x != 0, "other than 0")
-            if one > 0 and not self.moves:
-                return self.lengths_times(one)
+            uniform = number(f"{self.name}: factor", factor, lambda x: x != 0, "other than 0")
+            if uniform > 0 and not self.moves:
+                return self.lengths_times(uniform)
         scaled: Self = self.transformed(scaling(f"{self.name}: factor", factor))
         return scaled
 

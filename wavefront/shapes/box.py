@@ -57,9 +57,9 @@ def Box(
     corners = np.empty((6, 4, 3))
     for side, (u, v, axis) in enumerate(SIDES):
         for sign in (0, 1):
-            part = corners[2 * side + sign]
-            part[:, axis] = 2 * sign - 1
-            part[:, u], part[:, v] = square[:, 0] * (2 * sign - 1), square[:, 1]
+            quad_corners = corners[2 * side + sign]
+            quad_corners[:, axis] = 2 * sign - 1
+            quad_corners[:, u], quad_corners[:, v] = square[:, 0] * (2 * sign - 1), square[:, 1]
     quad = 4 * np.arange(6)[:, None, None] + np.array([[0, 1, 2], [0, 2, 3]])
     return Mesh(
         middle + half * corners.reshape(-1, 3),

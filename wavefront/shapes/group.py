@@ -49,13 +49,13 @@ class Group(tuple[Shape, ...]):
         """Return the group of all these shapes."""
         if isinstance(shapes, Shape) or not isinstance(shapes, Iterable):
             raise SceneError(f"Group shapes must be a list of shapes, got {in_brief(shapes)}")
-        found: list[Shape] = []
+        members: list[Shape] = []
         for number, shape in enumerate(shapes):
             if not isinstance(shape, Shape | Group):
                 what = in_brief(shape)
                 raise SceneError(f"Group shapes[{number}] is {what}; it must be a shape or a group")
-            found += shape if isinstance(shape, Group) else [shape]
-        return super().__new__(cls, found)
+            members += shape if isinstance(shape, Group) else [shape]
+        return super().__new__(cls, members)
 
     @property
     def moves(self) -> bool:
@@ -93,9 +93,9 @@ class Group(tuple[Shape, ...]):
         if motions is not None:
             moving = [[_renamed(shape.transformed(motion), name) for shape in self] for motion in motions]
             return type(self)(shape for copy in moving for shape in copy)
-        given: Any = transforms
-        single = as_array("Group transforms", given).ndim == 2
-        matrices = finite_array("Group transforms", given, (4, 4) if single else (None, 4, 4))
+        raw_matrices: Any = transforms
+        single = as_array("Group transforms", raw_matrices).ndim == 2
+        matrices = finite_array("Group transforms", raw_matrices, (4, 4) if single else (None, 4, 4))
         columns = [_copies(shape, matrices.reshape(-1, 4, 4), name) for shape in self]
         return type(self)(shape for row in zip(*columns, strict=True) for shape in row)
 
@@ -111,7 +111,7 @@ def _copies(shape: Shape, matrices: Matrix, name: str | None) -> list[Shape]:
     if isinstance(shape, Mesh):
         return list(Instance.many(shape, matrices, name=name))
     if isinstance(shape, Instance) and shape.motion is None:
-        own = shape.material if shape.has_material else None
+        material = shape.material if shape.has_material else None
         label = shape.name if name is None else name
-        return list(Instance.many(shape.mesh, matrices @ shape.transform, material=own, name=label))
+        return list(Instance.many(shape.mesh, matrices @ shape.transform, material=material, name=label))
     return [_renamed(shape.transformed(matrix), name) for matrix in matrices]

@@ -67,10 +67,10 @@ def HeightField(
         i, j = np.argwhere(np.isinf(heights))[0]
         raise SceneError(f"{name}: z[{i}][{j}] is {heights[i, j]}; it must be finite, or NaN for a hole")
     across, along = _places(f"{name}: x", x, columns), _places(f"{name}: y", y, rows)
-    there = np.isfinite(heights).ravel()
+    exists = np.isfinite(heights).ravel()
     points = np.stack([*np.meshgrid(across, along), np.where(np.isfinite(heights), heights, 0)], -1)
     faces = _faces(rows, columns, reverse=(across[0] < across[-1]) != (along[0] < along[-1]))
-    faces = faces[there[faces].all(1)]
+    faces = faces[exists[faces].all(1)]
     if not len(faces):
         raise SceneError(f"{name}: z has no three heights beside each other that are not NaN")
     vertices = points.reshape(-1, 3)

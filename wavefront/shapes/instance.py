@@ -130,8 +130,8 @@ class Instance(Shape):
             raise SceneError(f"{name or 'instance'}: mesh must be a wf.Mesh, got {in_brief(mesh)}")
         label = mesh.name if name is None else name
         motions = motions_of(transforms)
-        given: Any = transforms if motions is None else Together(motions).at_starts()
-        matrices = finite_array(f"{label}: transforms", given, (None, 4, 4))
+        starts: Any = transforms if motions is None else Together(motions).at_starts()
+        matrices = finite_array(f"{label}: transforms", starts, (None, 4, 4))
         bad = np.flatnonzero(~can_place(mesh, matrices))
         if bad.size:
             cls(mesh, matrices[bad[0]], name=f"{label}: transforms[{bad[0]}]")  # raises
@@ -140,8 +140,8 @@ class Instance(Shape):
         instance.name = label
         vars(instance).update(mesh=mesh, _material=shared)
         out = placed_together([instance] * len(matrices), matrices, {})  # which have been checked
-        for each, motion in zip(out, motions or (), strict=False):
-            each.motion = motion
+        for placed, motion in zip(out, motions or (), strict=False):
+            placed.motion = motion
         return out
 
     def __repr__(self) -> str:
@@ -204,23 +204,23 @@ class Instance(Shape):
 
     def _carried(self, placing: Motion | Doubles) -> Self:
         instance = copy(self)
-        own = self.transform if self.motion is None else self.motion
-        instance.transform = product(placing, own)
+        placement = self.transform if self.motion is None else self.motion
+        instance.transform = product(placing, placement)
         return instance
 
-    def with_mesh(self, factor: float, mesh: Mesh, own: float) -> Instance:
+    def with_mesh(self, factor: float, mesh: Mesh, mesh_factor: float) -> Instance:
         """Return the instance with all lengths multiplied by `factor`, and the same material.
 
         Parameters
         ----------
         factor
             Factor of the lengths in the scene.
-        mesh, own
-            The mesh of the new instance: its mesh, with lengths multiplied by `own`.
+        mesh, mesh_factor
+            The mesh of the new instance: its mesh, with lengths multiplied by `mesh_factor`.
         """
         instance = copy(self)
         instance.mesh, instance.transform = mesh, self.transform.copy()
-        instance.transform[:3, :3] *= factor / own
+        instance.transform[:3, :3] *= factor / mesh_factor
         instance.transform[:3, 3] *= factor
         return instance
 
@@ -259,8 +259,8 @@ def placed_together(
 def motions_of(transforms: Any) -> list[Motion] | None:
     """Return a list of motions, None for anything else, such as matrices."""
     if isinstance(transforms, list | tuple) and transforms:
-        found = [each for each in transforms if isinstance(each, Motion)]
-        return found if len(found) == len(transforms) else None
+        motions = [transform for transform in transforms if isinstance(transform, Motion)]
+        return motions if len(motions) == len(transforms) else None
     return None
 
 

@@ -348,12 +348,12 @@ def _check_forms(name: str, vertices: Any, normals: Any, tangents: Any) -> None:
 
 def _faces_of_zero_area(vertices: Doubles, faces: Ints) -> Ints:
     """Return the numbers of the faces whose corners lie on a line, or in a point."""
-    found = []
-    for part in spans(len(faces), AT_ONCE):
-        a, b, c = np.ascontiguousarray(vertices.take(faces[part], 0).transpose(1, 2, 0))
+    numbers = []
+    for block in spans(len(faces), AT_ONCE):
+        a, b, c = np.ascontiguousarray(vertices.take(faces[block], 0).transpose(1, 2, 0))
         flat = np.flatnonzero(~cross(b - a, c - a).any(0))
-        found.append(part.start + flat)
-    flat = np.concatenate(found)
+        numbers.append(block.start + flat)
+    flat = np.concatenate(numbers)
     if flat.size:  # lengths are divided by the longest, so that squares of small ones do not underflow
         a, b, c = vertices.take(faces[flat], 0).transpose(1, 2, 0)
         edges = np.stack([b - a, c - a])

@@ -43,15 +43,15 @@ def over_time(
     keys = rising(f"{name}: times", times)
     if not moving:
         raise SceneError(f"{name}: times are given; then {next(iter(arrays))} must have shape (t, n, 3)")
-    found = {}
+    changing = {}
     for key in moving:
-        found[key] = finite_array(f"{name}: {key}", arrays[key], (None, None, 3))
-        if len(found[key]) != len(keys):
-            forms = plural(len(found[key]), "form")
+        changing[key] = finite_array(f"{name}: {key}", arrays[key], (None, None, 3))
+        if len(changing[key]) != len(keys):
+            forms = plural(len(changing[key]), "form")
             raise SceneError(f"{name}: {key} has {forms} and times {len(keys)}; there must be one for each")
-        bad = np.argwhere(np.abs(found[key]) > FLOAT32_MAX)
+        bad = np.argwhere(np.abs(changing[key]) > FLOAT32_MAX)
         if len(bad):
             at = "".join(f"[{i}]" for i in bad[0])
-            value = found[key][tuple(bad[0])]
+            value = changing[key][tuple(bad[0])]
             raise SceneError(f"{name}: {key}{at} is {value:g}; its size must be at most {FLOAT32_MAX:.3g}")
-    return {**arrays, **{key: value[0] for key, value in found.items()}}, Samples(keys, found)
+    return {**arrays, **{key: value[0] for key, value in changing.items()}}, Samples(keys, changing)

@@ -63,8 +63,8 @@ def Points(
     >>> by_height = wf.Points(points, radius=0.01, colors=points[:, 2], cmap="viridis")
     >>> cloud = wf.Points(np.random.default_rng(1).random((100, 3)), radius=0.01)
     """
-    places, given = cloud_arrays(points)
-    colors = given if colors is None else colors
+    places, cloud_colors = cloud_arrays(points)
+    colors = cloud_colors if colors is None else colors
     start, moving = over_time(name, times, {"points": places})
     at_start = positions(f"{name}: points", start["points"])
     if not len(at_start):
@@ -121,24 +121,26 @@ def cloud_arrays(points: Any) -> tuple[Any, Any]:
     and of PyVista (`points`, `point_data`).
     """
     if hasattr(points, "vertices"):
-        given, places, kind = getattr(points, "colors", None), points.vertices, None
+        raw_colors, places, kind = getattr(points, "colors", None), points.vertices, None
     elif hasattr(points, "points"):
         data = getattr(points, "point_data", None)
-        given = getattr(points, "colors", None) if data is None else point_colors(data)
+        raw_colors = getattr(points, "colors", None) if data is None else point_colors(data)
         places, kind = np.asarray(points.points), np.float64
     else:
         return points, None
-    if given is None or len(given) != len(places):
+    if raw_colors is None or len(raw_colors) != len(places):
         return places, None
-    colors = np.asarray(given)
+    colors = np.asarray(raw_colors)
     return places, srgb(np.clip(colors, 0, 1)) if kind is not None and colors.dtype == kind else colors
 
 
 def point_colors(data: Any) -> Any:
     """Return the colors of PyVista's `point_data`: an array of bytes, (n, 3) or (n, 4); None without one."""
     arrays = [np.asarray(data[name]) for name in data.keys()]  # noqa: SIM118
-    found = [each for each in arrays if each.dtype == np.uint8 and each.ndim == 2 and each.shape[1] in (3, 4)]
-    return found[0] if found else None
+    colors = [
+        rows for rows in arrays if rows.dtype == np.uint8 and rows.ndim == 2 and rows.shape[1] in (3, 4)
+    ]
+    return colors[0] if colors else None
 
 
 def usual_radius(points: Doubles) -> float:
@@ -148,12 +150,12 @@ def usual_radius(points: Doubles) -> float:
         raise SceneError("a radius for one point is not known, as it has no neighbor: give it a radius")
     some = points[:: max(1, count // max(LEAST_POINTS, MOST_DISTANCES // count))]
     rank = NEIGHBOR if count > FEW else 1
-    found = np.zeros(len(some))
+    nearest = np.zeros(len(some))
     for number, point in enumerate(some):
         away = points - point
         squares = away[:, 0] * away[:, 0] + away[:, 1] * away[:, 1] + away[:, 2] * away[:, 2]
-        found[number] = np.partition(squares, rank)[rank]
-    radius = 0.5 * float(np.sqrt(np.median(found)))
+        nearest[number] = np.partition(squares, rank)[rank]
+    radius = 0.5 * float(np.sqrt(np.median(nearest)))
     return radius or 0.01 * float(np.linalg.norm(np.ptp(points, axis=0))) or 1.0
 
 
@@ -174,17 +176,17 @@ def _ends_of_mesh(mesh: Any) -> tuple[Doubles, Doubles]:
 
 def _ends_of_lines(name: str, lines: Any) -> tuple[Doubles, Doubles]:
     """Return the ends (n, 3) of the pieces of lines."""
-    given, of_path = lines, hasattr(lines, "entities")
+    pieces, of_path = lines, hasattr(lines, "entities")
     if of_path:
-        given = [entity.discrete(lines.vertices, scale=lines.scale) for entity in lines.entities]
-    if not isinstance(given, Iterable):
+        pieces = [entity.discrete(lines.vertices, scale=lines.scale) for entity in lines.entities]
+    if not isinstance(pieces, Iterable):
         raise SceneError(f"{name}: lines must be a mesh, a path, or points (n, 3), got {lines!r}")
-    parts = list(given)
-    if parts and as_array(f"{name}: lines[0]", parts[0]).ndim == 1:
-        parts = [parts]
+    polylines = list(pieces)
+    if polylines and as_array(f"{name}: lines[0]", polylines[0]).ndim == 1:
+        polylines = [polylines]
     starts, ends = [np.zeros((0, 3))], [np.zeros((0, 3))]
-    for number, part in enumerate(parts):
-        points = as_array(f"{name}: lines[{number}]", part)
+    for number, polyline in enumerate(polylines):
+        points = as_array(f"{name}: lines[{number}]", polyline)
         if of_path and points.shape[-1] == 2:
             points = np.column_stack([points, np.zeros(len(points))])
         points = finite_array(f"{name}: lines[{number}]", points, (None, 3))

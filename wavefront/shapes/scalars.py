@@ -39,13 +39,13 @@ class Coloring:
         SceneError
             If there are none of the name.
         """
-        found = self.scalars
-        if isinstance(found, str):
-            if found not in known and found not in AXES:
-                there = ", ".join(map(repr, [*known, *AXES]))
-                raise SceneError(f"scalars is {found!r}; there are {there}")
-            found = known[found] if found in known else points[:, AXES.index(found)]
-        return lengths("scalars", found)
+        scalars = self.scalars
+        if isinstance(scalars, str):
+            if scalars not in known and scalars not in AXES:
+                names = ", ".join(map(repr, [*known, *AXES]))
+                raise SceneError(f"scalars is {scalars!r}; there are {names}")
+            scalars = known[scalars] if scalars in known else points[:, AXES.index(scalars)]
+        return lengths("scalars", scalars)
 
     def map_of(self, values: Doubles) -> ColorMap:
         """Return the colors of numbers."""
@@ -61,7 +61,7 @@ def lengths(name: str, values: Any) -> Doubles:
 
 
 def map_material(colors: ColorMap, opacity: float = 1.0, name: str | None = None) -> Material:
-    """Return what shows a colormap by the texture coordinates that it gives; nothing is blended."""
+    """Return a material that shows a colormap by its texture coordinates, without a blend of colors."""
     picture = colors.picture()
     alpha: Any = None if opacity == 1 else opacity
     if (picture[..., 3] < 255).any():

@@ -59,9 +59,9 @@ def crease_normals(vertices: Doubles, faces: Ints, degrees: float) -> Doubles | 
     ends = np.cumsum(counts)
     crowded = counts > MOST_CORNERS
     last = np.where(crowded, 0, ends - 1)[places[order]]
-    own = np.ascontiguousarray(flat[:, order // 3])
+    facet = np.ascontiguousarray(flat[:, order // 3])
     area = length(normals)
-    share = own * (corner_angles(corner) * (area / (area.max() or 1))[:, None]).ravel()[order]
+    share = facet * (corner_angles(corner) * (area / (area.max() or 1))[:, None]).ravel()[order]
     total = share.copy()
     _, least = sin_cos(np.float64(np.radians(degrees / 2)))
     least = 2 * least * least - 1 - SAME
@@ -69,16 +69,16 @@ def crease_normals(vertices: Doubles, faces: Ints, degrees: float) -> Doubles | 
     while here.size:  # over the pairs of corners at a vertex, by their distance in the order
         here = here[here + step <= last[here]]
         other = here + step
-        near = dot(own[:, here], own[:, other]) >= least
+        near = dot(facet[:, here], facet[:, other]) >= least
         here_near, other_near = here[near], other[near]
         total[:, here_near] += share[:, other_near]
         total[:, other_near] += share[:, here_near]
         step += 1
     total /= np.where(total.any(0), length(total), 1)
-    keep: Bools = (dot(total, own) >= 1 - SAME) | ~total.any(0)
+    keep: Bools = (dot(total, facet) >= 1 - SAME) | ~total.any(0)
     if keep.all():
         return None
-    total[:, keep] = own[:, keep]
+    total[:, keep] = facet[:, keep]
     out = np.empty((len(order), 3))
     out[order] = total.T
     return out.reshape(-1, 3, 3)

@@ -135,8 +135,8 @@ class Sphere(SphereEmission):
         if self.moves or isinstance(transform, Motion):
             moving: Self = self.transformed(transform)
             return moving
-        given = finite_array(f"{self.name}: transform", transform, (4, 4))
-        matrices, scale = similarities(f"{self.name}: transform", given)
+        matrix = finite_array(f"{self.name}: transform", transform, (4, 4))
+        matrices, scale = similarities(f"{self.name}: transform", matrix)
         sphere = copy(self)
         sphere.center, sphere.radius = points_by(matrices, self.centers)[0], self.radius * float(scale[0])
         if self.transform is not None:  # perhaps mirrored

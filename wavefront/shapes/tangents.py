@@ -55,14 +55,14 @@ def _smooth(mesh: Mesh, flat: Doubles, area: Doubles, angles: Doubles) -> Double
     weights = (angles * (area != 0)[:, None]).ravel()
     total = np.bincount(groups, weights)
     out = np.empty((groups.size, 6))
-    for part in (slice(0, 3), slice(3, 6)):
-        vectors = np.repeat(flat[:, part], 3, 0)
+    for columns in (slice(0, 3), slice(3, 6)):
+        vectors = np.repeat(flat[:, columns], 3, 0)
         size = np.linalg.norm(vectors, axis=1)
         mean_size = np.bincount(groups, weights * size) / np.where(total > 0, total, 1)
         units = vectors / np.where(size > 0, size, 1)[:, None]
         direction = np.stack([np.bincount(groups, weights * unit) for unit in units.T], 1)
         length = np.linalg.norm(direction, axis=1)
         scale = mean_size / np.where(length > 0, length, 1)
-        out[:, part] = (direction * scale[:, None])[groups]
+        out[:, columns] = (direction * scale[:, None])[groups]
     out[np.repeat(area == 0, 3)] = 0
     return out.reshape(-1, 3, 6)
