@@ -190,7 +190,7 @@ def attributes_read(shapes: Sequence[Shape]) -> list[str]:
                 known = ", ".join(ATTRIBUTES)
                 raise SceneError(f"{shape.name}: its material reads {name!r}; it must be one of {known}")
             read.add(name)
-            if isinstance(mesh, Mesh) and ATTRIBUTES[name].given(mesh) is None:
+            if isinstance(mesh, Mesh) and ATTRIBUTES[name].array_of(mesh) is None:
                 lacking.setdefault(ATTRIBUTES[name].title, {})[id(mesh)] = shape.name
     for title, names in lacking.items():
         problem = plural(
