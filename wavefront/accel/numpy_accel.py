@@ -27,7 +27,7 @@ def leaf_size_for(primitives: int) -> int:
 
 
 def batch_size(leaves: int) -> int:
-    """Return how many rays to trace at a time: enough to fill blocks of rays, few enough for the cache."""
+    """Return the number of rays to trace at a time: enough to fill blocks, few enough for the cache."""
     if not leaves:
         return BATCH
     return 1 << 15 if leaves < 256 else 1 << 16 if leaves < 2048 else 1 << 18

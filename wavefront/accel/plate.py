@@ -155,7 +155,7 @@ class PlateAccelerator:
         return np.flatnonzero(~misses)
 
     def _distance(self, origin: Floats, direction: Floats, exclude_prim: Ints) -> Floats:
-        """Return how far rays (3, n) are from the plane, (n,); inf where they leave it or do not cross it."""
+        """Return the distances (n,) of rays (3, n) to the plane; inf where they leave it or miss it."""
         with np.errstate(all="ignore"):
             t = (self._height - _along(self._normal, origin)) / _along(self._normal, direction)
             t[~(t > 0) | (exclude_prim >= self.first)] = np.inf

@@ -63,7 +63,7 @@ class Flow:
                 yield hidden, self._hidden(self.times[which], times, places, film_then)
 
     def _delay(self, row: Doubles) -> Doubles:
-        """Return how much later than the first row others (n,) are read, s."""
+        """Return the times (n,) from the reading of the first row to that of others, s."""
         if not self.camera.rolling_shutter:
             return np.zeros(len(row))
         width, height = self.camera.resolution

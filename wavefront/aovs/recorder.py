@@ -321,7 +321,7 @@ def recorded_aovs(wanted: Sequence[str], scene: CompiledScene) -> tuple[str, ...
 
 
 def _opacity(paths: Paths, hits: Hits) -> Floats:
-    """Return how much of the background camera paths (n,) hide: all where they meet anything, else by media.
+    """Return the opacity (n,) of camera paths over a background: 1 on a hit, else that of media.
 
     Media leave the part by which the throughput of its channels weighs a gray background. It is at most
     2, as the weights of paths where media scatter have a mean of 1 over the channels.

@@ -87,7 +87,7 @@ class Plastic(Microfacets):
         self._one = None if isinstance(self.roughness, BaseTexture) else float(self.roughness[0])
 
     def albedo(self, wo: Floats) -> Floats:
-        """Return about the albedo of boundary and base."""
+        """Return the approximate albedo of boundary and base."""
         through, _, escaping = self._boundary(wo[2])
         base = self._base(escaping) * through
         return base + self.specular_reflectance * (f4(1) - through)

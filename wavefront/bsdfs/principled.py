@@ -164,7 +164,7 @@ class Principled(LayeredBsdf):
         )
 
     def albedo(self, wo: Floats) -> Floats:
-        """Return about the albedo of all lobes, layered as in `evaluate`."""
+        """Return the approximate albedo of all lobes, layered as in `evaluate`."""
         base = self._layered().base
         assert isinstance(base, MetallicBase)
         low, high, _, _ = gloss_tables()

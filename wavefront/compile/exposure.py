@@ -161,7 +161,7 @@ class _Forms:
         return mesh, mesh.at(self._shutter.middle)
 
     def _of_spheres(self, shape: Spheres) -> Mover:
-        """Return how spheres move that have places of their own over time."""
+        """Return the motion of spheres that have places of their own over time."""
         assert shape.deformation is not None
         matrices, deformation = _matrices(shape), shape.deformation
         carried = matrices(np.array([self._shutter.middle]))[0]

@@ -62,7 +62,7 @@ class LightGroups(Generic[K]):
 
 
 def primitive_count(shape: Mesh | CurvedShape) -> int:
-    """Return how many triangles, or other primitives, a shape has."""
+    """Return the number of triangles, or other primitives, of a shape."""
     return len(shape.faces) if isinstance(shape, Mesh) else shape.count
 
 

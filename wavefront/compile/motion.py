@@ -128,7 +128,7 @@ class CurvedRows:
         return [SweptSpheres(first, last, self.kind.radii) for first, last in pairwise(self.centers)]
 
     def ways(self, row: Ints, time: Doubles) -> Doubles:
-        """Return how far spheres, by rows (n,), are at times (n,) from where `kind` has them, (3, n)."""
+        """Return the ways (3, n) of spheres, by rows (n,), from their places in `kind` to times (n,)."""
         assert self.centers is not None
         assert isinstance(self.kind, SpherePrimitives)
         (step, fraction), at = step_at(self.times, time), row - self.first
@@ -465,7 +465,7 @@ def place_accelerators(
 
 
 def curved_that_move(numbers: Ints, curved: int, instances: int, exposed: Exposed) -> int:
-    """Return how many curved shapes move, given the `numbers` of meshes, `curved` shapes and `instances`."""
+    """Return the number of curved shapes that move; `numbers` are of meshes, curved shapes and instances."""
     k = numbers.size - instances
     return sum(number in exposed.movers for number in numbers[k - curved : k].tolist())
 
@@ -473,7 +473,7 @@ def curved_that_move(numbers: Ints, curved: int, instances: int, exposed: Expose
 def light_motions(
     exposed: Exposed, center: Doubles, factor: float, reach: float
 ) -> tuple[Motions | None, dict[int, int]]:
-    """Return how lights move from where they are in the middle of the time, and which by their numbers.
+    """Return the motions of lights from their places in the middle of the time, and their rows by number.
 
     Parameters
     ----------

@@ -26,7 +26,7 @@ UNKNOWN_RESIDENT = 150 * 10**6  # bytes that a process is taken to use where the
 
 
 def address_space_left() -> float:
-    """Return how many bytes this process may still map (`ulimit -v`); infinite without a limit."""
+    """Return the number of bytes that this process may still map (`ulimit -v`); infinite without a limit."""
     if not sys.platform.startswith("linux"):
         return math.inf
     limit = resource.getrlimit(resource.RLIMIT_AS)[0]
@@ -42,7 +42,7 @@ def available_memory() -> float:
 
 
 def resident_memory() -> int:
-    """Return how many bytes of memory this process uses now; a guess where the system does not say."""
+    """Return the memory that this process uses now, bytes; a guess where the system does not say."""
     return int(_bytes_in("/proc/self/smaps_rollup", "Pss:", UNKNOWN_RESIDENT))
 
 

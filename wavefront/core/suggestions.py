@@ -145,7 +145,7 @@ def unknown_keyword(
 
 
 def _places(function: Callable[..., object], args: Sequence[object]) -> Iterator[str]:
-    """Yield where an argument is looked for: the function, and the classes that it is of."""
+    """Yield the places where an argument is looked for: the function, and the classes that it is of."""
     name = function.__qualname__
     if "." not in name:
         yield name

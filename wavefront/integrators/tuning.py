@@ -169,7 +169,7 @@ def _blocks(L: Floats, block: int, pixels: int) -> Doubles:
 
 
 def _deviation(blocks: Doubles) -> Doubles:
-    """Return how blocks differ from the mean of their pixels; the mean square is the variance."""
+    """Return the differences of blocks from the mean of their pixels; the mean square is the variance."""
     return (blocks - blocks.mean(2, keepdims=True)) * math.sqrt(BLOCKS / (BLOCKS - 1))
 
 

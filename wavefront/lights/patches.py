@@ -39,7 +39,7 @@ class SkyPatches:
         return cls(axes, sines, per_row, 1 + np.concatenate([[0], per_row.cumsum()[:-1]]))
 
     def __len__(self) -> int:
-        """Return how many there are, with the ground."""
+        """Return the number of patches, with the ground."""
         return int(self.first[-1]) + 1
 
     @property

@@ -57,7 +57,7 @@ def _divided(numbers: Words, divisor: int) -> tuple[Words, Words]:
 
 
 def cell_shifts(block_x: Words, block_y: Words, member: Words) -> tuple[Words, Words]:
-    """Return by how many pixels, (n,) in x and y, the tiles of cells are shifted: a hash of the cells.
+    """Return the shifts of the tiles of cells, (n,) pixels in x and y: a hash of the cells.
 
     The hash is that of C. Wellons, Prospecting for Hash Functions, 2018, lowbias32.
     """

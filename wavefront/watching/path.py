@@ -130,7 +130,7 @@ class PathVertices(Sequence[Vertex]):
         self.radiance, self.camera, self.time = radiance, camera, time
 
     def __len__(self) -> int:
-        """Return how many vertices the path has."""
+        """Return the number of vertices."""
         return len(self._vertices)
 
     def __getitem__(self, index: Any) -> Any:

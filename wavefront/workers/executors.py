@@ -340,7 +340,7 @@ def worker_count(workers: int | None, executor: str | ExecutorLike | None = None
 
 
 def _workers_in(executor: str | ExecutorLike | None) -> int | None:
-    """Return how many workers an executor has; None if it does not say."""
+    """Return the number of workers of an executor; None if it does not say."""
     if isinstance(executor, DaskClient):
         return threads_in(executor)
     if not isinstance(executor, Executor):
@@ -430,7 +430,7 @@ def _seconds(clocks: Iterable[int]) -> dict[int, float]:
 
 
 def waves_per_job(executor: str | ExecutorLike) -> int:
-    """Return how many waves a job may have."""
+    """Return the number of waves that a job may have."""
     return WAVES_PER_TASK if isinstance(executor, DaskClient) else 1
 
 

@@ -27,7 +27,7 @@ class Gloss(ABC):
 
     @abstractmethod
     def schlick(self, weight: Floats) -> Floats:
-        """Return about the reflectance, (3, n), at weight = (1 − cosθ)⁵."""
+        """Return the approximate reflectance (3, n) at weight = (1 − cosθ)⁵."""
 
     @abstractmethod
     def passed(self, roughness: Floats, cos: Floats) -> Floats:
@@ -99,7 +99,7 @@ class FresnelGloss(Gloss):
         return self.tint * (plain if self.film is None else plain + self._film_adds(self.film, cos))
 
     def schlick(self, weight: Floats) -> Floats:
-        """Return about the reflectance, (3, n), at weight = (1 − cosθ)⁵."""
+        """Return the approximate reflectance (3, n) at weight = (1 − cosθ)⁵."""
         root = (self.index - f4(1)) / (self.index + f4(1))
         return self.tint * (root * root + (f4(1) - root * root) * weight)
 
