@@ -195,7 +195,7 @@ def _split_group(
 
 
 def _split_huge(ids: Ints, low: Floats, high: Floats, leaf_size: int) -> tuple[Ints, int]:
-    """Split one segment of very many primitives where it is best for a sample of them."""
+    """Split one segment of very many primitives at the best place for a sample of them."""
     sample = ids[:: ids.size // SAMPLE]
     alone, count = np.zeros(1, np.intp), np.array([sample.size])
     best_cost, axis, place = np.inf, 0, sample.size // 2

@@ -1,4 +1,4 @@
-"""Faces that overlap in a plane without being the same: which these are, and planes that they share.
+"""Faces that overlap in a plane without being equal, and the planes that they share.
 
 Their corners are rounded, so each has a plane of its own, and rounding would decide which of them is nearest.
 On a common plane they are at one distance, and the first of them is hit.
@@ -57,7 +57,7 @@ def share_planes(table: TriangleTable, triangles: Floats, ids: Ints, joined: Int
 
 
 def find_overlaps(triangles: Floats, ids: Ints, plane: Doubles, joined: Ints = NONE) -> Overlaps | None:
-    """Find those of the triangles `ids` (ascending) that overlap others in a plane; None if there are none.
+    """Find the triangles among `ids` (ascending) that overlap others in a plane; None without any.
 
     Parameters
     ----------

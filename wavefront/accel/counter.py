@@ -10,7 +10,7 @@ from .plate import surely_occluded
 
 
 class RayCounter:
-    """An accelerator that counts the rays which it passes on: those to nearest surfaces and shadow rays."""
+    """An accelerator that counts the rays of another one: rays to nearest surfaces, and shadow rays."""
 
     def __init__(self, accelerator: Accelerator) -> None:
         self.name = accelerator.name

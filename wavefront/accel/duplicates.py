@@ -1,4 +1,4 @@
-"""Triangles that are there several times, so that the first of them is hit."""
+"""Triangles that occur several times: the first of them is hit."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ def first_of_equals(triangles: Floats) -> Bools:
 
 
 def repeated(keys: Keys) -> tuple[Ints, Ints]:
-    """Return the places (r,) of keys (k,) that are there several times, by key, and where each key begins.
+    """Return the places (r,) of repeated keys (k,), ordered by key, and where each key begins.
 
     Keys may differ in their lowest bits, as many as the places need.
     """

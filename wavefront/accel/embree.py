@@ -97,7 +97,7 @@ class EmbreeAccelerator:
     def _near_curved(
         self, origin: Floats, direction: Floats, exclude_prim: Ints
     ) -> tuple[tuple[Floats, Floats, Ints], Lanes]:
-        """Return those of rays (3, n) that may hit curved primitives, and which lanes they are."""
+        """Return the rays, of n, that may hit curved primitives, and their lanes."""
         left = np.where(exclude_prim >= self._first_curved, exclude_prim - self._first_curved, -1)
         lanes = ALL if self._balls is None else self._balls.near(origin, direction, left)
         return (take(origin, lanes), take(direction, lanes), take(left, lanes)), lanes

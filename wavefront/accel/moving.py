@@ -1,4 +1,4 @@
-"""Ray queries where instances move: each ray meets them where they are at its time."""
+"""Ray queries where instances move: each ray meets them in their places at its time."""
 
 from __future__ import annotations
 

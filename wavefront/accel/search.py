@@ -56,7 +56,7 @@ class PrimitiveTree:
         self.tree.leaves = self._leaf_matrices(leaf_size)
 
     def of(self, primitives: Primitives) -> Self:
-        """Return the same tree over primitives in other states, which it bounds, too."""
+        """Return the same tree over other states of the primitives, which it bounds, too."""
         rebound = copy(self)
         rebound._primitives = primitives
         return rebound

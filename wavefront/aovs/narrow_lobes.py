@@ -47,7 +47,7 @@ class NarrowLobes:
         self._rough = broadcast(np.True_, n)
 
     def begin(self, paths: Paths) -> None:
-        """Note that paths begin at points that look in one direction, if they do."""
+        """Note whether paths begin with a narrow lobe: those of a camera do, those of sensors do not."""
         if paths.sensor is None:
             self._rough = np.zeros(self._rough.size, np.bool_)
 

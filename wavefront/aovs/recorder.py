@@ -92,7 +92,7 @@ class SampleRecorder(PathRecorder):
         self._shared: SampleRecorder | None = None  # of the paths from shared points
 
     def prepare(self, paths: Paths) -> None:
-        """Have paths that start at the camera carry the recorder, if it needs them."""
+        """Attach the recorder to paths that start at the camera, if it needs them."""
         if self._wanted == (LUX,) and not self._divided:
             return
         paths.recorder = self
@@ -312,7 +312,7 @@ class SampleRecorder(PathRecorder):
 
 
 def recorded_aovs(wanted: Sequence[str], scene: CompiledScene) -> tuple[str, ...]:
-    """Return the AOVs that recorders of a scene return, those with a key by it."""
+    """Return the names of the AOVs that recorders return; keyed ones have a name for each key."""
     names: list[str] = []
     for name in wanted:
         keys = scene.light_groups.names if name == "light_groups" else dict.fromkeys(scene.shape_names)

@@ -341,7 +341,7 @@ def _neighbors(x: Floats, size: int) -> list[tuple[Ints, Floats]]:
 
 
 def _fine(table: Doubles) -> Floats:
-    """Return a table, if it has one row with so many columns that the nearest is enough."""
+    """Return a table in float32; one of a single row gets so many columns that the nearest is enough."""
     if table[0].size == COLUMNS:
         fine, known = np.linspace(0, 1, FINE), np.linspace(0, 1, COLUMNS)
         rows = [np.interp(fine, known, side) for side in table.reshape(-1, COLUMNS)]

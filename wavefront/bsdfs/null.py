@@ -9,7 +9,7 @@ from .base import Bsdf
 
 
 class NullSurface(Bsdf):
-    """A surface that light passes as if it were not there: only the border of a medium.
+    """An invisible surface, such as the border of a medium: light passes it unchanged.
 
     A `Material` with it has an alpha of 0, whatever else is given.
 

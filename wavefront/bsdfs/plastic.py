@@ -138,7 +138,7 @@ class Plastic(Microfacets):
         return gloss / np.where(total > 0, total, f4(1))
 
     def _boundary(self, cos: Floats) -> tuple[Floats, Floats, Floats]:
-        """Part of light that gets in, of diffuse light that gets in, and that gets out again; (n,)."""
+        """Transmittances (n,): of light to the base, of diffuse light to the base, and of that from it."""
         if self._smooth:
             reflected, _ = fresnel_dielectric(cos, np.full(1, self.ior, f4))
             escaping = part_escaping(self.ior)

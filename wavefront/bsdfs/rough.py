@@ -88,7 +88,7 @@ class MicrofacetSurface:
 
 
 class Microfacets(MicrofacetSurface, JointBsdf):
-    """A BSDF whose surface consists of microfacets; a subclass declares which of these are parameters."""
+    """A BSDF whose surface consists of microfacets; a subclass declares its parameters."""
 
     rotation: Any = np.zeros(1, f4)
     multiscatter: Any = False

@@ -89,7 +89,7 @@ class GroupNumbers:
         return self._number(BY_DEFAULT)
 
     def of_shapes(self, shapes: Sequence[Mesh | CurvedShape]) -> Ints:
-        """Return the number of each primitive of shapes; it is -1 of those that are dark."""
+        """Return the group of each primitive of shapes; -1 for dark shapes."""
         keys = [LightKey(shape.material.group, shape.material.efficacy) for shape in shapes]
         numbers = [
             -1 if shape.emission is None else self._number(key)

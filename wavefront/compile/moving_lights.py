@@ -35,7 +35,7 @@ def moving_light(light: Light, record: LightRecord, motions: Motions | None, num
 def moving_parts(
     record: LightRecord, rows: Ints | None, motion: MotionTable
 ) -> Iterator[tuple[LightRecord, Ints | None]]:
-    """Yield emitting surfaces in parts: those that stand still, those that move, and meshes that deform.
+    """Yield emitting surfaces by kind: still ones, rigid ones that move, and meshes that deform.
 
     Parameters
     ----------

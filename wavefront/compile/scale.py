@@ -75,7 +75,7 @@ def _radius(mesh: Mesh) -> float:
 
 
 def _with_material(shape: Any, material: Material) -> Any:
-    """Return a shape with this material: itself where it has it."""
+    """Return a shape with a material; itself if it has that already."""
     if shape.material is material:
         return shape
     changed = copy(shape)

@@ -1,4 +1,4 @@
-"""Faces of shapes that hold something, where they lie on those of other such shapes, or back to back.
+"""Faces of shapes with something inside that lie on faces of other such shapes, or back to back.
 
 A ray meets only one of two surfaces at one place, and goes on behind both. So that its media are
 known, it is told the other one, too.

@@ -94,7 +94,7 @@ class Bar:
 
 
 class _Screen:
-    """The standard error, where there is one: text that it cannot show is lost, and nothing else.
+    """The standard error, if any: text that it cannot show is lost, without an error.
 
     It is None in programs without a console, and may be closed, full, or a pipe that nobody reads.
     """

@@ -21,7 +21,7 @@ MOST_PARTS = 8  # of a path, that are looked for in other folders
 def followed(
     source: str | os.PathLike[str], reference: str, places: Sequence[Path], roots: Sequence[Path]
 ) -> list[Path]:
-    """Return where a file that `source` refers to may be: in folders, whichever of them are allowed.
+    """Return the places of a file that `source` refers to: in those folders that are allowed.
 
     A file from elsewhere must not make the program read arbitrary files. So the target of each reference must
     be inside one of the `roots`, also after symbolic links are followed.

@@ -80,7 +80,7 @@ class Registry(Mapping[str, T], Generic[T]):
         return len(self._entries)
 
     def find(self, value: Any, setting: str | None = None) -> T:
-        """Return the thing that a setting names, or the setting itself if it is such a thing.
+        """Return the object that a setting names, or the setting itself if it is such an object.
 
         Parameters
         ----------

@@ -42,7 +42,7 @@ class SharedInt:
         self._value[0] = 0
 
     def publish(self, path: str) -> None:
-        """Move the integer to a new file, from where processes that were not forked can `attach` it.
+        """Move the integer to a new file, so that processes that were not forked can `attach` it.
 
         It stays usable when the file is removed.
         """

@@ -1,1 +1,1 @@
-"""What few scenes have, a file each: when a scene has it, and where it acts. See compile/program.py."""
+"""Rare properties of scenes, a file each: when a scene has one, and where it acts. See compile/program.py."""

@@ -15,7 +15,7 @@ from ..stages.interaction import Surfaces, at_corners, face_viewer, interpolated
 
 
 class InterpolatedSurfaces(Surfaces):
-    """Surfaces of triangles that need to know where on them they are hit."""
+    """Surfaces of triangles that need the barycentric weights of hits."""
 
     __slots__ = ()
 

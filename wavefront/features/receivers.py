@@ -11,7 +11,7 @@ from ..stages.shade import Shading, receiver_of
 
 
 class ReceivingShading(Shading):
-    """Surfaces that tell lights which way they face."""
+    """Surfaces that give lights their normals."""
 
     __slots__ = ()
 

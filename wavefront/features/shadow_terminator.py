@@ -78,7 +78,7 @@ class RoundShading(Shading):
             self.start = self.start + self.surface.lift
 
     def origins(self, cos_g: Floats) -> Floats:
-        """Return where rays start: above the round surface where there is one, as no light crosses it."""
+        """Return the origins of rays: above the round surface, if any, as no light crosses it."""
         origins = super().origins(cos_g)
         if self.surface.lift is None or origins is self.start:
             return origins

@@ -26,7 +26,7 @@ def seen_by(scene: CompiledScene, camera: Camera, shutter: Shutter | None) -> Co
 
 
 def seen_with(scene: CompiledScene, table: GuideTable | None = None, branches: int = 1) -> CompiledScene:
-    """Return a scene as paths of a view meet it, which a table guides, and which go on in several ways.
+    """Return a scene for the paths of a view, with the table that guides them, and their branches.
 
     Paths from lights meet the scene as it is.
     """

@@ -121,7 +121,7 @@ def _histograms(cell: Ints, chosen: Ints, bins: Ints, weight: Doubles, cells: in
 
 
 def _spread(contents: Doubles) -> Doubles:
-    """Return contents (k, side²) of which each bin shares its density with those around it."""
+    """Return contents (k, side²), blurred: each bin shares its density with the bins around it."""
     area = solid_angles(SIDE)
     density = contents / area
     around = sum(density[:, near] for near in neighbors(SIDE)) / 8

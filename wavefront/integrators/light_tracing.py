@@ -286,7 +286,7 @@ def _times(paths: Paths, lanes: Ints) -> Doubles | None:
 
 
 def _around(shade: Shading, paths: Paths, lanes: Ints, wo: Floats) -> Any:
-    """Return the stacks (4, k) of light that leaves some lanes along wo (3, k); None where there are none."""
+    """Return the stacks (4, k) of light that leaves some lanes along wo (3, k); None without media."""
     if paths.media is None:
         return None
     cos = dot(take(shade.surface.ng, lanes), wo)

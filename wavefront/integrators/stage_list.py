@@ -101,7 +101,7 @@ def _acting(features: Sequence[Feature], point: str) -> list[Feature]:
 
 
 def _called(function: Any, seen: set[Any]) -> set[Any]:
-    """Return a function and those that it names, and that these do."""
+    """Return a function and all that it calls, directly or not."""
     if not isinstance(function, FunctionType) or function in seen:
         return seen
     seen.add(function)

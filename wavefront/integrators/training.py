@@ -32,7 +32,7 @@ GOLDEN = np.uint64(0x9E3779B1)  # 2³² divided by the golden ratio spreads few 
 
 @soa
 class Vertices(SoA):
-    """Where some paths scattered, and in which directions they left."""
+    """Vertices where paths scattered, with the directions in which they left."""
 
     slot: Ints  # (k,)
     point: Floats  # (3, k) relative to the scene's center

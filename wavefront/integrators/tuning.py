@@ -79,7 +79,7 @@ class Run:
         return common + (of_one - common) / branches
 
     def cost(self, branches: int, than: Run, than_branches: int = 1) -> float:
-        """Return variance times rays over that of another run; 1 where that has no variance."""
+        """Return the cost, variance times rays, over that of another run; 1 if the other has no variance."""
         cost, least = (
             run.mean_variance(ways) * (run.first + ways * run.onward)
             for run, ways in ((self, branches), (than, than_branches))
@@ -87,12 +87,12 @@ class Run:
         return cost / least if least > 0 else 1.0
 
     def share_of_outliers(self) -> float:
-        """Return the part of the variance of all pixels that those have which do not count."""
+        """Return the part of the variance of the picture that is in the pixels left out as outliers."""
         every = math.fsum(self.variance)
         return 1 - math.fsum(self.variance[self.kept()]) / every if every > 0 else 0.0
 
     def share_of_own(self) -> float:
-        """Return the part of the variance that light has which pixels cannot share; 1 where there is none."""
+        """Return the part of the variance by light that pixels cannot share; 1 where there is no variance."""
         every = _mean(self.variance[self.kept()])
         return _mean(self.own[self.kept()]) / every if every > 0 else 1.0
 
@@ -233,7 +233,7 @@ class SecondPoints(PathRecorder):
         self._picture = picture
 
     def record_hits(self, leg: Leg) -> None:
-        """Count those of the first bounce that go on, and keep the light that was found so far."""
+        """Count the materials of second points, and keep the light so far."""
         if leg.bounce == 1 and self._picture is not None:
             self.met += np.bincount(material_rows(leg.scene, leg.kept_hits, ALL), minlength=self.met.size)
             self.own, self._shaded = self._picture.copy(), False

@@ -270,7 +270,7 @@ class LightRecord(SoA, Light):
         """
 
     def lighting(self, receiver: Receiver) -> LightRecord:
-        """Return the light as it is sampled from n points at which it lights surfaces; here: as it is.
+        """Return the light as it is sampled from n points on surfaces; here: as it is.
 
         Its `sample_li` and `pdf_li` may draw directions by the irradiance of each surface. Such a light says
         it by `takes_receiver`.
@@ -371,7 +371,7 @@ def sampled_li(light: LightRecord, point: Floats, u: Floats) -> LightSample:
 
 
 def emitters_of(light: LightRecord) -> Emitters:
-    """Return where the k lights of a record are; NaN for those that are nowhere.
+    """Return the places of the k lights of a record; NaN for those at infinity.
 
     Raises
     ------

@@ -47,7 +47,7 @@ class LightSampler(Protocol):
 
 
 class Irradiance(Protocol):
-    """What each light brings to parts of the scene, and where it is."""
+    """The irradiance by each light in parts of the scene, and the places of lights."""
 
     @property
     def emitters(self) -> Emitters:

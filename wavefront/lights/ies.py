@@ -62,7 +62,7 @@ class Web:
 
 
 def _place(angles: Floats, at: Floats) -> tuple[Ints, Floats, Bools]:
-    """Return the cell (n,) between angles that each number is in, where in it, and whether it is in any."""
+    """Return the cell (n,) between angles of each number, the place in it, and whether it is in any."""
     cell = np.clip(np.searchsorted(angles, at, "right") - 1, 0, len(angles) - 2)
     low, high = angles.take(cell), angles.take(cell + 1)
     inside = (at >= angles[0] - NEAR) & (at <= angles[-1] + NEAR)

@@ -1,4 +1,4 @@
-"""Lights at infinity, which rays meet where they leave the scene, and how several make one sky."""
+"""Lights at infinity, which rays meet where they leave the scene, and the sum of several."""
 
 from __future__ import annotations
 

@@ -157,7 +157,7 @@ class CosineProduct:
 
 
 class TexelProduct(CosineProduct):
-    """Such a distribution that is asked for texels. Cells have as many rows and columns of these each."""
+    """A product from which whole texels are drawn. All cells have equally many rows and columns of them."""
 
     def _choose_texels(self, light: Floats) -> None:
         (rows, columns), (height, width) = self._cells, self.shape

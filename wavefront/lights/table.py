@@ -17,7 +17,7 @@ from .samplers import LIGHT_SAMPLERS, SingleLightSampler, SubsetLightSampler
 
 
 class IrradianceOf:
-    """What lights of several kinds bring to parts of a scene of radius `scene_radius`, and where they are."""
+    """The irradiance by lights of several kinds in parts of a scene (`scene_radius`), and their places."""
 
     def __init__(self, kinds: Sequence[LightRecord], scene_radius: float) -> None:
         self.kinds, self.scene_radius = kinds, scene_radius

@@ -52,7 +52,7 @@ class TexturedTriangleLights(TriangleLights):
         return self.source >= 0
 
     def sample_li(self, point: Floats, u: Floats) -> LightSample:
-        """Pick a point as other triangles do, and say where on the triangle it is."""
+        """Pick a point as other triangles do, with its barycentric weights."""
         sample, b = self._sample_at(point, u)
         sample.prim = np.broadcast_to(self.prim, point.shape[1:])
         sample.b1, sample.b2 = b

@@ -52,7 +52,7 @@ class Bilinear:
         return total
 
     def cell(self, p: Floats) -> tuple[Ints, Floats, Ints, Floats]:
-        """Return the columns and rows (n,) of the cells that points p (2, n) are in, and where in them."""
+        """Return the columns and rows (n,) of the cells of points p (2, n), and the places in them."""
         x, y = (
             np.clip(p[axis], f4(0), f4(1)) * f4(count - 1)
             for axis, count in enumerate((self.columns, self.rows))

@@ -101,7 +101,7 @@ class PictureTiles:
 
     @property
     def count(self) -> int:
-        """How many there are, with those that have no pixel."""
+        """Number of tiles, with those that have no pixel."""
         return -(-self.width // (SIDE * STRIDE)) * -(-self.height // (SIDE * STRIDE)) * STRIDE**2
 
     @property
@@ -120,7 +120,7 @@ class PictureTiles:
 
 @soa
 class PointTiles:
-    """The tiles of sensors: those that follow each other in an order of all of them."""
+    """The tiles of sensors: each has sensors that follow each other in an order of all."""
 
     rank: Ints  # (n,) place of each pixel in this order
 

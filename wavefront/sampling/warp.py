@@ -179,7 +179,7 @@ def linear(u: Floats, slope: Floats) -> Floats:
 
 
 def linear_with_density(u: Floats, slope: Floats) -> tuple[Floats, Floats]:
-    """Return `linear` and its density (n,) at once, which is the root that it takes."""
+    """Return `linear` and its density (n,) at once: the density is the root in the inversion."""
     start = f4(1) - slope
     root = slope * u
     root *= f4(4)

@@ -1,4 +1,4 @@
-"""Rays that go on behind surfaces: those with alpha, those that the camera does not see, and others.
+"""Rays that go on behind surfaces, such as those with alpha and those that the camera does not see.
 
 A path hits such a surface with a probability equal to its opacity there (stochastic alpha); otherwise it
 continues straight on from just behind the surface, which is not a scattering event. A shadow ray is

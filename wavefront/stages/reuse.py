@@ -181,7 +181,7 @@ def add_shared(
 def _leaving(
     scene: CompiledScene, light: Floats, number: Ints, k: int, glossy: GlossyPoints | None
 ) -> Floats:
-    """Return the light that leaves some points, of which k are matte, towards their own paths."""
+    """Return the light that leaves points, the first k of them matte, towards their own paths."""
     leaving = take(light, number)
     some = np.flatnonzero(number >= k)
     if glossy is not None and some.size:

@@ -44,7 +44,7 @@ class Estimate:
 
 @soa
 class Significance:
-    """p-values: chances that pictures which differ by noise alone differ by as much as these do."""
+    """p-values: the chances of a difference as large as that of two pictures by noise alone."""
 
     pixels: float
     blocks: float

@@ -155,7 +155,7 @@ class DensityIntegrator:
         return below
 
     def _around_samples(self, boxes: Doubles, cell: Ints) -> tuple[Doubles, Ints]:
-        """Split cells of which the samples fill only a part, so that nodes do not miss that part.
+        """Split cells that samples fill only in part, so that nodes do not miss that part.
 
         Returns boxes (4, m), and the cell that each belongs to, (m,).
         """

@@ -212,7 +212,7 @@ def _number(value: float | None) -> str:
 
 
 class VertexRecorder(PathRecorder):
-    """Notes all that happens to one path. Its columns are those of the one lane there is."""
+    """Records all events of one path. All columns are of its lane."""
 
     needs_directions = True
 

@@ -108,7 +108,7 @@ class Trace:
         return next(self._steps)
 
     def close(self) -> None:
-        """Leave the loop where it is. A trace that nobody holds any more does so by itself."""
+        """End the loop. A trace without references ends by itself."""
         self._steps.close()
 
     def path(self, pixel: Pixel) -> PathVertices:

@@ -1,4 +1,4 @@
-"""Executors: the contract of workers, the table of who has them, and which of these suit a render.
+"""Executors: the contract of workers, the table of executors, and the choice of one for a render.
 
 NumPy lets go of Python's global lock inside its loops, but between two of them every thread must take
 it again, and waiting for it costs more than the loops win (docs/performance.md has figures). So where the
@@ -146,7 +146,7 @@ def with_warnings(work: Callable[[Any], Any], job: Any) -> tuple[Any, tuple[str,
 
 
 class LocalWorkers:
-    """Workers that share the memory of this process, so that they need not be sent anything but jobs."""
+    """Workers that share the memory of this process, so that only jobs are sent to them."""
 
     def __init__(self, pool: TaskPool, work: Callable[[Any], Any]) -> None:
         self.replaceable = pool.replaceable
@@ -202,7 +202,7 @@ def submitted(executor: Executor, function: Callable[..., Any], /, *args: Any) -
 
 
 def shares_memory(executor: Executor, stop: SharedInt) -> bool:
-    """Return whether the workers of an executor are in this process, as those that it has say themselves.
+    """Return whether the workers of an executor are in this process; they are asked.
 
     Raises
     ------

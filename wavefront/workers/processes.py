@@ -181,7 +181,7 @@ class _Context:
 
     @contextmanager
     def starting(self) -> Iterator[None]:
-        """End the processes that were started if not all can be: Python would wait for them when it ends."""
+        """End the started processes if another one cannot start: Python would wait for them at its end."""
         try:
             yield
         except BaseException:

@@ -219,7 +219,7 @@ class _Entry:
 
 
 class _KeptWork:
-    """The work that was sent to this process, until there was no job of it for `KEEP` seconds."""
+    """The work that was sent to this process; it is kept for `KEEP` seconds after its last job."""
 
     def __init__(self) -> None:
         self._lock = threading.Lock()
