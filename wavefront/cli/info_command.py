@@ -117,24 +117,24 @@ def _lines(path: str, scene: Scene) -> Iterator[str]:
         yield f"  {texture!r}, {plural(texture.channels, 'channel')}, {'sRGB' if texture.srgb else 'linear'}"
 
 
-def _textures(thing: Any, seen: set[int]) -> Iterator[Texture]:
-    """Yield the images that a material, or a part of one, reads."""
-    if id(thing) in seen:
+def _textures(node: Any, seen: set[int]) -> Iterator[Texture]:
+    """Yield the image textures that a material, a BSDF, or a tuple of these, reads."""
+    if id(node) in seen:
         return
-    seen.add(id(thing))
-    if isinstance(thing, Texture):
-        yield thing
-    elif isinstance(thing, list | tuple):
-        for element in thing:
+    seen.add(id(node))
+    if isinstance(node, Texture):
+        yield node
+    elif isinstance(node, list | tuple):
+        for element in node:
             yield from _textures(element, seen)
-    elif type(thing).__module__.startswith(_PACKAGE) and hasattr(thing, "__dict__"):
-        for element in vars(thing).values():
+    elif type(node).__module__.startswith(_PACKAGE) and hasattr(node, "__dict__"):
+        for element in vars(node).values():
             yield from _textures(element, seen)
 
 
-def _distinct(things: Iterable[Any]) -> list[Any]:
-    """Return things, each once."""
-    return list({id(thing): thing for thing in things}.values())
+def _distinct(elements: Iterable[Any]) -> list[Any]:
+    """Return the distinct objects among some, in their order."""
+    return list({id(element): element for element in elements}.values())
 
 
 def _triangles(shapes: Iterable[Shape]) -> int:

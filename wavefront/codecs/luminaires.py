@@ -117,15 +117,15 @@ def luminaire_texts(path: str | os.PathLike[str]) -> tuple[str, str, str]:
     if tilt is None or tilt[1].upper() in ("NONE", "INCLUDE", ""):
         return name, text, ""
     folder = Path(name).resolve().parent
-    (beside,) = followed(name, tilt[1], [folder], [folder])
+    (tilt_path,) = followed(name, tilt[1], [folder], [folder])
     try:
-        return name, text, decode_text(read_bytes(beside, MOST_BYTES))
+        return name, text, decode_text(read_bytes(tilt_path, MOST_BYTES))
     except SceneError as error:
         raise SceneError(f"{name}: TILT={tilt[1]}: {error}") from error
 
 
 def parsed_luminaire(name: str, text: str, tilt: str) -> Photometry:
-    """Return the luminous intensity of a luminaire from what `luminaire_texts` returns.
+    """Return the luminous intensity of a luminaire from the texts of `luminaire_texts`.
 
     Raises
     ------
@@ -136,7 +136,7 @@ def parsed_luminaire(name: str, text: str, tilt: str) -> Photometry:
     return _lm63(name, lines, tilt.split("\n")) if name.lower().endswith(".ies") else _eulumdat(name, lines)
 
 
-def _lm63(name: str, lines: list[str], beside: list[str]) -> Photometry:
+def _lm63(name: str, lines: list[str], tilt_lines: list[str]) -> Photometry:
     matches = ((at, TILT.match(line)) for at, line in enumerate(lines))
     start, tilting = next(((at, match[1]) for at, match in matches if match), (0, ""))
     if not tilting:
@@ -145,7 +145,7 @@ def _lm63(name: str, lines: list[str], beside: list[str]) -> Photometry:
     tilt = None
     if tilting.upper() != "NONE":
         included = tilting.upper() == "INCLUDE"
-        tilt = _tilt(numbers if included else _Numbers(str(Path(name).parent / tilting), beside, 0, " "))
+        tilt = _tilt(numbers if included else _Numbers(str(Path(name).parent / tilting), tilt_lines, 0, " "))
     numbers.take("number of lamps, lumens per lamp", 2, -1)
     factor = float(numbers.take("candela multiplier", 1)[0])
     rows = numbers.count("number of vertical angles", 2)

@@ -86,9 +86,9 @@ def _binary(data: bytes, kind: bytes, size: tuple[int, int, int], most: int) -> 
         _check_there(data, row * height)
         packed = np.frombuffer(data, np.uint8, row * height).reshape(height, row)
         return np.unpackbits(packed, axis=1)[:, :width]
-    item = np.dtype(np.uint8 if most < 256 else ">u2")
-    _check_there(data, width * height * channels * item.itemsize)
-    return np.frombuffer(data, item, width * height * channels)
+    sample = np.dtype(np.uint8 if most < 256 else ">u2")
+    _check_there(data, width * height * channels * sample.itemsize)
+    return np.frombuffer(data, sample, width * height * channels)
 
 
 def _check_there(data: bytes, need: int) -> None:

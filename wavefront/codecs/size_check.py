@@ -62,17 +62,18 @@ def _check_png(data: bytes, budget: Budget) -> None:
         raise SceneError("not a readable png image: its header is damaged")
     width, height = int.from_bytes(header[:4], "big"), int.from_bytes(header[4:8], "big")
     budget.check_size(height, width)
-    item, channels = (2 if header[8] == 16 else 1), max(PNG_CHANNELS[header[9]], 4 * (header[9] == PALETTE))
+    octets = 2 if header[8] == 16 else 1  # of a sample
+    channels = max(PNG_CHANNELS[header[9]], 4 * (header[9] == PALETTE))
     channels += any(name == b"tRNS" for name, _, _ in png_chunks(data)) and channels in (1, 3)  # alpha
-    copies = 4 if item == 2 and channels > 1 else 2  # 16 bits of several channels are decoded in two halves
-    budget.charge(f"a picture of {width} × {height} pixels", height * width * channels * item * copies)
+    copies = 4 if octets == 2 and channels > 1 else 2  # 16 bits of several channels are decoded in two halves
+    budget.charge(f"a picture of {width} × {height} pixels", height * width * channels * octets * copies)
     bits, interlaced = header[8] * PNG_CHANNELS[header[9]], header[12] == 1
     need = sum(rows * (1 + (columns * bits + 7) // 8) for columns, rows in _passes(width, height, interlaced))
     pixels = [(content, check) for name, content, check in png_chunks(data) if name == b"IDAT"]
     available = _inflated((content for content, _ in pixels), need)
     if available < need:
         raise SceneError(f"ends early: {width} × {height} pixels take {need} bytes; {available} are there")
-    if item == 2 and any(zlib.crc32(content, zlib.crc32(b"IDAT")) != check for content, check in pixels):
+    if octets == 2 and any(zlib.crc32(content, zlib.crc32(b"IDAT")) != check for content, check in pixels):
         raise SceneError("the checksum of a chunk b'IDAT' is wrong")
 
 

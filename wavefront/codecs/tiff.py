@@ -44,7 +44,7 @@ def decode(data: bytes, budget: Budget) -> NDArray[Any] | None:
     """
     tags = _tags(data)
     bits = tags.get(BITS, (1,))
-    if max(bits) <= 8 or _one(tags, PHOTOMETRIC, 1) not in COLORS or _one(tags, COMPRESSION, 1) == 7:
+    if max(bits) <= 8 or _first(tags, PHOTOMETRIC, 1) not in COLORS or _first(tags, COMPRESSION, 1) == 7:
         return None
     layout = _layout(data, tags)
     budget.check_size(layout.height, layout.width)
@@ -68,7 +68,7 @@ class _Layout:
 
 def _layout(data: bytes, tags: dict[int, tuple[int, ...]]) -> _Layout:
     bits, form = tags.get(BITS, (1,)), tags.get(FORMAT, (UNSIGNED,))
-    samples, compression = _one(tags, SAMPLES, 1), _one(tags, COMPRESSION, 1)
+    samples, compression = _first(tags, SAMPLES, 1), _first(tags, COMPRESSION, 1)
     widths = {UNSIGNED: (16, 32), FLOAT: (16, 32, 64)}.get(form[0], ())
     if len(set(bits)) > 1 or len(set(form)) > 1 or bits[0] not in widths:
         listed = ", ".join(map(str, bits))
@@ -77,12 +77,12 @@ def _layout(data: bytes, tags: dict[int, tuple[int, ...]]) -> _Layout:
         raise SceneError(f"is compressed by method {compression}, which is not read with {bits[0]} bits")
     order = "<" if data[:2] == b"II" else ">"
     kind = np.dtype(f"{order}{'f' if form[0] == FLOAT else 'u'}{bits[0] // 8}")
-    width, height = _one(tags, WIDTH, 0), _one(tags, HEIGHT, 0)
-    colors = COLORS[_one(tags, PHOTOMETRIC, 1)]
+    width, height = _first(tags, WIDTH, 0), _first(tags, HEIGHT, 0)
+    colors = COLORS[_first(tags, PHOTOMETRIC, 1)]
     if not colors <= samples <= LARGEST:
         raise SceneError(f"has {samples} samples for each pixel; it must have at least {colors}")
-    planes = samples if _one(tags, PLANAR, 1) == 2 else 1
-    across = _one(tags, TILE_WIDTH, 0) or width
+    planes = samples if _first(tags, PLANAR, 1) == 2 else 1
+    across = _first(tags, TILE_WIDTH, 0) or width
     return _Layout(tags, height, width, samples, kind, planes, across)
 
 
@@ -108,7 +108,7 @@ def _tags(data: bytes) -> dict[int, tuple[int, ...]]:
     return tags
 
 
-def _one(tags: dict[int, tuple[int, ...]], tag: int, default: int) -> int:
+def _first(tags: dict[int, tuple[int, ...]], tag: int, default: int) -> int:
     return tags.get(tag, (default,))[0]
 
 
@@ -154,7 +154,7 @@ def _rows(
         WIDTH: (size,),
         HEIGHT: (layout.height,),
         BITS: (8,),
-        COMPRESSION: (_one(tags, COMPRESSION, 1),),
+        COMPRESSION: (_first(tags, COMPRESSION, 1),),
         PHOTOMETRIC: (1,),
         SAMPLES: (1,),
     }
@@ -164,7 +164,7 @@ def _rows(
     else:
         shown |= {
             OFFSETS: offsets,
-            ROWS: (min(_one(tags, ROWS, layout.height), layout.height),),
+            ROWS: (min(_first(tags, ROWS, layout.height), layout.height),),
             COUNTS: counts,
         }
     with Image.open(BytesIO(_file(data, shown)), formats=["TIFF"]) as image:
@@ -191,24 +191,24 @@ def _file(data: bytes, tags: dict[int, tuple[int, ...]]) -> bytes:
 
 def _predicted(raw: NDArray[np.uint8], layout: _Layout, samples: int) -> NDArray[Any]:
     """Return the numbers (H, columns, samples) of decompressed bytes (H, n)."""
-    height, item = len(raw), layout.kind.itemsize
-    predictor = _one(layout.tags, PREDICTOR, 1)
+    height, octets = len(raw), layout.kind.itemsize
+    predictor = _first(layout.tags, PREDICTOR, 1)
     if predictor == 3:
         sums = np.cumsum(raw.reshape(height, -1, samples), axis=1, dtype=np.uint8)
-        split = sums.reshape(height, item, -1).transpose(0, 2, 1)  # the highest bytes come first
-        return np.ascontiguousarray(split).view(f">f{item}").reshape(height, -1, samples)
+        split = sums.reshape(height, octets, -1).transpose(0, 2, 1)  # the highest bytes come first
+        return np.ascontiguousarray(split).view(f">f{octets}").reshape(height, -1, samples)
     values = raw.view(layout.kind).reshape(height, -1, samples)
     if predictor != 2:
         return values
-    whole = np.dtype(f"u{item}")
-    words = raw.view(np.dtype(f"{layout.kind.str[0]}u{item}")).reshape(height, -1, samples).astype(whole)
+    whole = np.dtype(f"u{octets}")
+    words = raw.view(np.dtype(f"{layout.kind.str[0]}u{octets}")).reshape(height, -1, samples).astype(whole)
     sums = np.cumsum(words, axis=1, dtype=whole)
-    return sums if layout.kind.kind == "u" else sums.view(f"f{item}")
+    return sums if layout.kind.kind == "u" else sums.view(f"f{octets}")
 
 
 def _converted(values: NDArray[Any], tags: dict[int, tuple[int, ...]], layout: _Layout) -> NDArray[Any]:
     """Return gray or RGB, with alpha where there is one: uint16, or float32 of other numbers."""
-    photometric, extra = _one(tags, PHOTOMETRIC, 1), tags.get(EXTRA)
+    photometric, extra = _first(tags, PHOTOMETRIC, 1), tags.get(EXTRA)
     colors = COLORS[photometric]
     has_alpha = layout.samples > colors and (extra is None or extra[0] != 0)
     values = values[..., : colors + has_alpha]

@@ -24,8 +24,8 @@ def warn_of_colormap(name: str, colors: NDArray[Any]) -> None:
     """
     if "matplotlib.colors" not in sys.modules or colors.dtype.kind != "f" or len(colors) < 2:
         return
-    some = colors[np.linspace(0, len(colors) - 1, MOST_ROWS).astype(np.intp), :3].astype(f4)
-    rows = {row.tobytes() for row in some if ((row != 0) & (row != 1)).any()}
+    sample = colors[np.linspace(0, len(colors) - 1, MOST_ROWS).astype(np.intp), :3].astype(f4)
+    rows = {row.tobytes() for row in sample if ((row != 0) & (row != 1)).any()}
     match = next((label for label, table in _tables().items() if rows <= table), None)
     if len(rows) > 1 and match is not None:
         warn_caller(

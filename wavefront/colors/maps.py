@@ -40,9 +40,9 @@ class ColorMap:
     def colors(self, values: Doubles) -> Floats:
         """Return the linear colors and opacities (n, 4) of numbers (n,)."""
         place, count = self.places(values), len(self.table)
-        some = np.isfinite(place)
-        entry = np.clip((np.where(some, place, 0) * count).astype(np.intp), 0, count - 1)
-        codes = np.where(some[:, None], self.table[entry], np.array(self.no_number, np.uint8))
+        is_finite = np.isfinite(place)
+        entry = np.clip((np.where(is_finite, place, 0) * count).astype(np.intp), 0, count - 1)
+        codes = np.where(is_finite[:, None], self.table[entry], np.array(self.no_number, np.uint8))
         return srgb(codes.astype(np.uint8))
 
     def picture(self) -> NDArray[np.uint8]:
@@ -52,8 +52,8 @@ class ColorMap:
     def coordinates(self, values: Doubles) -> Doubles:
         """Return the texture coordinates (n, 2) of numbers (n,), in the picture or beyond."""
         place = self.places(values)
-        some = np.isfinite(place)
-        return np.stack([np.where(some, place, 0.5), np.where(some, 0.75, 0.25)], 1)
+        is_finite = np.isfinite(place)
+        return np.stack([np.where(is_finite, place, 0.5), np.where(is_finite, 0.75, 0.25)], 1)
 
 
 def color_map(name: str, values: ArrayLike, cmap: Any = None, limits: ArrayLike | None = None) -> ColorMap:
@@ -82,10 +82,10 @@ def color_map(name: str, values: ArrayLike, cmap: Any = None, limits: ArrayLike 
         low, high = finite_array("clim", limits, (2,)).tolist()
         return ColorMap(_table(cmap), (low, high))
     numbers = numeric(name, values)
-    some = numbers[np.isfinite(numbers)]
-    if not some.size:
+    finite = numbers[np.isfinite(numbers)]
+    if not finite.size:
         raise SceneError(f"{name} has no finite number")
-    return ColorMap(_table(cmap), (float(some.min()), float(some.max())))
+    return ColorMap(_table(cmap), (float(finite.min()), float(finite.max())))
 
 
 def numeric(name: str, values: ArrayLike) -> Doubles:

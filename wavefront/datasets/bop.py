@@ -137,10 +137,10 @@ class BopLayout:
             "cam_t_w2c": self._translation(world),
         }
 
-    def _pose(self, camera: Camera, item: AnnotatedObject) -> dict[str, Any]:
-        model = camera.extrinsics() @ item.pose
+    def _pose(self, camera: Camera, obj: AnnotatedObject) -> dict[str, Any]:
+        model = camera.extrinsics() @ obj.pose
         return {
-            "obj_id": item.model,
+            "obj_id": obj.model,
             "cam_R_m2c": model[:3, :3].ravel().tolist(),
             "cam_t_m2c": self._translation(model),
         }

@@ -44,13 +44,13 @@ class CocoLayout:
         view.write_colors(str(self._folder / IMAGES / f"{view.name}.png"))
         height, width = view.image.shape[:2]
         annotations = []
-        for number, item in view.objects.items():
+        for number, obj in view.objects.items():
             mask = view.image.shape_id == number
             box = mask_box(mask)
             if box is not None:
                 annotations.append(
                     {
-                        "category_id": item.category,
+                        "category_id": obj.category,
                         "bbox": box,
                         "area": int(mask.sum()),
                         "segmentation": {"size": [height, width], "counts": run_lengths(mask)},
@@ -66,7 +66,7 @@ class CocoLayout:
         for number, view in views.items():
             for annotation in view["annotations"]:  # ids from 1 on: readers take an annotation 0 for none
                 annotations.append({"id": len(annotations) + 1, "image_id": number, **annotation})
-        categories = {item.category: item.name for item in self._objects.values()}
+        categories = {obj.category: obj.name for obj in self._objects.values()}
         write_json(
             self._folder / "annotations.json",
             {

@@ -143,7 +143,7 @@ def write_dataset(
     plan = moments(subject, views, seconds, bool(flow_names(settings["aovs"])))
     about = {
         "format": sorted(chosen),
-        "objects": [[item.shape, item.name] for item in annotated.values()],
+        "objects": [[obj.shape, obj.name] for obj in annotated.values()],
         "millimeters": millimeters,
         "depth_scale": depth_scale,
         "display": repr(display),

@@ -41,7 +41,7 @@ def write_models(
         Of a scene unit.
     """
     _warn_of_objects(shapes, objects)
-    meshes = {item.model: _model(shapes[number], item) for number, item in objects.items()}
+    meshes = {obj.model: _model(shapes[number], obj) for number, obj in objects.items()}
     make_folder(folder / FOLDER)
     sizes = {}
     for number, mesh in sorted(meshes.items()):
@@ -54,7 +54,7 @@ def write_models(
 
 def _warn_of_objects(shapes: Sequence[Shape], objects: Mapping[int, AnnotatedObject]) -> None:
     """Warn of objects that are no meshes, and so have no model, and of instances without a pose."""
-    kinds = {item.name: type(shapes[number]).__name__ for number, item in objects.items()}
+    kinds = {obj.name: type(shapes[number]).__name__ for number, obj in objects.items()}
     bare = [name for number, name in _names(objects) if not isinstance(shapes[number], Instance | Mesh)]
     still = [
         name
@@ -73,13 +73,13 @@ def _warn_of_objects(shapes: Sequence[Shape], objects: Mapping[int, AnnotatedObj
 
 
 def _names(objects: Mapping[int, AnnotatedObject]) -> list[tuple[int, str]]:
-    return [(number, item.name) for number, item in objects.items()]
+    return [(number, obj.name) for number, obj in objects.items()]
 
 
-def _model(shape: Shape, item: AnnotatedObject) -> Mesh | None:
+def _model(shape: Shape, obj: AnnotatedObject) -> Mesh | None:
     """Return the mesh of a model in its own coordinates; None if it is no mesh."""
     if isinstance(shape, Instance):
-        return shape.mesh if item.of_mesh else shape.to_mesh()
+        return shape.mesh if obj.of_mesh else shape.to_mesh()
     return shape if isinstance(shape, Mesh) else None
 
 

@@ -218,8 +218,8 @@ class Film(Sums):
         """
         error = self._scatter_of_batches(span)
         if self.dropped.size:
-            some = np.flatnonzero(self.dropped[span])
-            error[:, some] = (self._variance_of_samples(span) / np.maximum(self.used(span), 1))[:, some]
+            lanes = np.flatnonzero(self.dropped[span])
+            error[:, lanes] = (self._variance_of_samples(span) / np.maximum(self.used(span), 1))[:, lanes]
         return error if self.light is None else error + self.light.squared_error(span)
 
     def _scatter_of_batches(self, span: slice) -> Doubles:
@@ -277,12 +277,12 @@ class Film(Sums):
             if count > 1:
                 lanes = np.flatnonzero(self.count[span] == count)
                 sizes = lengths if lengths.size else np.full(count // batch_size(count), batch_size(count))
-                apart = _half_difference(take(self.batches[: sizes.size, :, span], lanes), sizes)
-                half_differences[:, lanes] = apart * np.sqrt(sizes.sum() / count)
+                difference = _half_difference(take(self.batches[: sizes.size, :, span], lanes), sizes)
+                half_differences[:, lanes] = difference * np.sqrt(sizes.sum() / count)
         if self.dropped.size:
-            some = np.flatnonzero(self.dropped[span])
+            lanes = np.flatnonzero(self.dropped[span])
             alone = self._variance_of_samples(span) / np.maximum(self.used(span), 1)
-            half_differences[:, some] = np.copysign(np.sqrt(alone), half_differences)[:, some]
+            half_differences[:, lanes] = np.copysign(np.sqrt(alone), half_differences)[:, lanes]
         return half_differences if self.light is None else half_differences + self.light.halves(span)
 
     def relative_variance(self, outliers: float = OUTLIERS) -> Doubles:
@@ -407,9 +407,9 @@ def _half_difference(batches: Floats, lengths: Ints) -> Doubles:
     """
     middle = lengths.size // 2
     first, second = int(lengths[:middle].sum()), int(lengths[middle:].sum())
-    apart = batches[:middle].sum(0, dtype=np.float64) / first
-    apart -= batches[middle:].sum(0, dtype=np.float64) / second
-    return np.asarray(apart * (np.sqrt(first * second) / (first + second)))
+    difference = batches[:middle].sum(0, dtype=np.float64) / first
+    difference -= batches[middle:].sum(0, dtype=np.float64) / second
+    return np.asarray(difference * (np.sqrt(first * second) / (first + second)))
 
 
 def batch_size(count: int) -> int:

@@ -67,8 +67,8 @@ class LightSums(Sums):
         order = np.argsort(pixel, kind="stable")
         targets, first, count = _groups(pixel.take(order).astype(np.intp))
         for size in 1 << np.arange(int(count.max(initial=0)).bit_length() + 1):
-            some = np.flatnonzero((count > size // 2) & (count <= size))
-            for lanes in np.array_split(some, -(-some.size * int(size) // AT_ONCE) or 1):
+            groups = np.flatnonzero((count > size // 2) & (count <= size))
+            for lanes in np.array_split(groups, -(-groups.size * int(size) // AT_ONCE) or 1):
                 if lanes.size:
                     number = np.arange(size)[:, None]
                     real = number < count.take(lanes)

@@ -26,7 +26,7 @@ class Sums:
     def __init_subclass__(cls) -> None:
         cls.FIELDS = tuple(dict.fromkeys((*cls.FIELDS, *get_annotations(cls))))
 
-    def _own(self) -> dict[str, NDArray[Any]]:
+    def _own_arrays(self) -> dict[str, NDArray[Any]]:
         """Return the arrays among the fields, by name."""
         fields = {name: getattr(self, name) for name in self.FIELDS}
         return {name: value for name, value in fields.items() if isinstance(value, np.ndarray)}
@@ -46,7 +46,7 @@ class Sums:
             for owner, sums in self._parts().items()
             for name, array in sums.arrays().items()
         }
-        return {**self._own(), **parts}
+        return {**self._own_arrays(), **parts}
 
     def restore(self, arrays: Mapping[str, NDArray[Any]], prefix: str = "") -> None:
         """Become the sums of which `arrays` returned these, each after `prefix`; they are not copied.
@@ -56,7 +56,7 @@ class Sums:
         SceneError
             If one is missing, or is of another shape or kind.
         """
-        for name, mine in self._own().items():
+        for name, mine in self._own_arrays().items():
             array = arrays.get(prefix + name)
             if (
                 array is None
@@ -76,8 +76,8 @@ class Sums:
 
     def merge(self, other: Self) -> None:
         """Add the sums of other samples."""
-        others = other._own()
-        for name, mine in self._own().items():
+        others = other._own_arrays()
+        for name, mine in self._own_arrays().items():
             if others[name].size and name not in self.JOINED:
                 setattr(self, name, mine + others[name] if mine.size else others[name].copy())
         parts = other._parts()

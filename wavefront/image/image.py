@@ -439,7 +439,7 @@ class Image(Answers):
                 counts, variance = self.counts, self.variance + other.variance
         sharing = [picture for picture in (self, other) if picture.metadata.get("reuse")]
         scatter: tuple[Scatter, ...] = ()
-        if error is not None and all(each.scatter for each in sharing):
+        if error is not None and all(picture.scatter for picture in sharing):
             scatters = [(x.scatter, x.standard_error) for x in sharing if x.standard_error is not None]
             scatter = scatter_of_difference(scatters, error)
         metadata = {"reuse": bool(sharing)}
@@ -1048,7 +1048,7 @@ def _checked_pixels(rgb: Any) -> NDArray[Any]:
 
 
 def last_film_image(sums: PictureSums, metadata: Mapping[str, Any]) -> Image:
-    """Return the picture as `film_image` does; the film is left without what its errors were made of."""
+    """Return the picture as `film_image` does; the film then lacks the sums of its errors."""
     image = _film_rgb(sums.film, metadata)
     sums.film.release_errors()
     _add_aovs(image, sums)
@@ -1123,7 +1123,7 @@ def _add_light_tracing(image: Image, light: LightSums) -> None:
 
 
 def _removed_part(rgb: Floats, removed: Floats) -> float:
-    """Return the part of the light that is not in a picture (H, W, 3) because it was `removed`, as it is."""
+    """Return the fraction of the light that was `removed` (H, W, 3) from a picture (H, W, 3) by a clamp."""
     left, lost = (float(values.mean(dtype=np.float64)) for values in (rgb, removed))
     return lost / (left + lost) if lost else 0.0
 

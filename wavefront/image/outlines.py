@@ -39,7 +39,7 @@ def _edges(ids: Ints, normal: Doubles, depth: Doubles, crease: float, jump: floa
 
 
 def _between_columns(ids: Ints, normal: Doubles, depth: Doubles, crease: float, jump: float) -> Bools:
-    """Return where there is an edge between a pixel and the next in its row, (H, W − 1)."""
+    """Return a mask (H, W − 1) of the pixels with an edge between them and the next in their row."""
     changes = ids[:, 1:] != ids[:, :-1]
     cosine = (normal[:, 1:] * normal[:, :-1]).sum(-1)
     turns = cosine < math.cos(math.radians(crease))  # False for NaN, which has another id
@@ -71,7 +71,7 @@ def _distance(edges: Edges, reach: int) -> Doubles:
 
 
 def _lower(nearest: Doubles, mask: Bools, dy: int, dx: int, away: float) -> None:
-    """Lower `nearest`[y, x] to `away` where `found`[y + dy, x + dx], in place."""
+    """Lower `nearest`[y, x] to `away` where `mask`[y + dy, x + dx], in place."""
     rows, columns = nearest.shape[0], mask.shape[1]
     y = slice(max(0, -dy), min(rows, rows - dy))
     x = slice(max(0, -dx), min(nearest.shape[1], columns - dx))

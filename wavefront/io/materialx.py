@@ -284,9 +284,9 @@ class _Document:
             declared.getName(): self._input(title, shader, declared)
             for declared in definition.getActiveInputs()
         }
-        return self._made(title, TRANSLATIONS[kind](self, title, inputs))
+        return self._material(title, TRANSLATIONS[kind](self, title, inputs))
 
-    def _made(self, title: str, inputs: dict[str, Value]) -> Material:
+    def _material(self, title: str, inputs: dict[str, Value]) -> Material:
         for name in UNSUPPORTED:
             value = inputs.pop(name, None)
             if value is not None and np.any(np.not_equal(value, 0)):
@@ -307,7 +307,7 @@ class _Document:
                 return self._without_wrong(title, values)
 
     def _without_wrong(self, title: str, values: dict[str, Any]) -> Material:
-        """Return a material of those inputs that each have a value that it can have."""
+        """Return a material of the inputs whose values are valid; the others get their defaults."""
         sound: dict[str, Any] = {}
         for name, value in values.items():
             with self.files.losses.part(f"material {title!r}", f"the default of {name} in its place"):
@@ -321,63 +321,65 @@ class _Document:
     def _of_standard(self, title: str, inputs: dict[str, Value]) -> dict[str, Value]:
         """Return the inputs of OpenPBR for those of standard surface, by the library's graph."""
         graph = self.standard.getNodeGraph("NG_standard_surface_to_open_pbr_surface")
-        made = {}
+        openpbr = {}
         for output in graph.getOutputs():
             name = output.getName().removesuffix("_out")
             try:
-                made[name] = self._node(output.getConnectedNode(), "", inputs, 0)
+                openpbr[name] = self._node(output.getConnectedNode(), "", inputs, 0)
             except Lost as error:
                 self._lose(title, name, str(error))
-        made["geometry_normal"] = inputs["normal"]
+        openpbr["geometry_normal"] = inputs["normal"]
         for name in ("specular_rotation", "coat_rotation", "transmission_extra_roughness"):
             if np.any(np.not_equal(inputs[name], 0)):
                 self._lose(title, name, "")
-        return made
+        return openpbr
 
     def _of_gltf(self, title: str, inputs: dict[str, Value]) -> dict[str, Value]:
         """Return the inputs of OpenPBR for those of glTF's surface."""
-        made = {other: inputs[name] for name, other in GLTF.items()}
+        openpbr = {other: inputs[name] for name, other in GLTF.items()}
         if inputs["alpha_mode"] == 0:
-            made["geometry_opacity"] = 1.0
+            openpbr["geometry_opacity"] = 1.0
         elif inputs["alpha_mode"] == 1:
-            parts = [made["geometry_opacity"], inputs["alpha_cutoff"], 1.0, 0.0]
-            made["geometry_opacity"] = _combined(_if_greater, parts)
-        cloth = isinstance(made["fuzz_color"], BaseTexture) or np.any(made["fuzz_color"])
-        made["fuzz_weight"] = 1.0 if cloth else 0.0
+            compared = [openpbr["geometry_opacity"], inputs["alpha_cutoff"], 1.0, 0.0]
+            openpbr["geometry_opacity"] = _combined(_if_greater, compared)
+        cloth = isinstance(openpbr["fuzz_color"], BaseTexture) or np.any(openpbr["fuzz_color"])
+        openpbr["fuzz_weight"] = 1.0 if cloth else 0.0
         distance = inputs["attenuation_distance"]
         if inputs["thickness"] and 0 < distance < np.inf:
-            made |= {"transmission_depth": distance, "transmission_color": inputs["attenuation_color"]}
+            openpbr |= {"transmission_depth": distance, "transmission_color": inputs["attenuation_color"]}
         else:
-            made["transmission_color"] = made["base_color"]
+            openpbr["transmission_color"] = openpbr["base_color"]
         for name in ("iridescence", "dispersion", "anisotropy_strength"):
             if np.any(np.not_equal(inputs.get(name, 0) or 0, 0)):
                 self._lose(title, name, "")
-        return made
+        return openpbr
 
     def _of_usd(self, title: str, inputs: dict[str, Value]) -> dict[str, Value]:
         """Return the inputs of OpenPBR for those of USD's preview surface."""
-        made = {other: inputs[name] for name, other in USD.items()}
-        made["emission_luminance"] = 1.0
+        openpbr = {other: inputs[name] for name, other in USD.items()}
+        openpbr["emission_luminance"] = 1.0
         cutoff = inputs["opacityThreshold"]
         if isinstance(cutoff, BaseTexture) or cutoff > 0:
-            made["geometry_opacity"] = _combined(_if_greater, [cutoff, made["geometry_opacity"], 0.0, 1.0])
+            openpbr["geometry_opacity"] = _combined(
+                _if_greater, [cutoff, openpbr["geometry_opacity"], 0.0, 1.0]
+            )
         if inputs["useSpecularWorkflow"] == 1:
             self._lose(title, "useSpecularWorkflow", "")
         if np.any(np.not_equal(inputs["displacement"], 0)):
             self._lose(title, "displacement", "")
-        return made
+        return openpbr
 
     def _of_disney(self, title: str, inputs: dict[str, Value]) -> dict[str, Value]:
         """Return the inputs of OpenPBR for those of Disney's principled surface."""
-        made = {other: inputs[name] for name, other in DISNEY.items()}
-        made["coat_roughness"] = _combined(_coat_roughness, [inputs["clearcoatGloss"]])
-        made["specular_weight"] = _combined(_doubled, [inputs["specular"]])
-        made["subsurface_color"] = made["transmission_color"] = made["base_color"]
+        openpbr = {other: inputs[name] for name, other in DISNEY.items()}
+        openpbr["coat_roughness"] = _combined(_coat_roughness, [inputs["clearcoatGloss"]])
+        openpbr["specular_weight"] = _combined(_doubled, [inputs["specular"]])
+        openpbr["subsurface_color"] = openpbr["transmission_color"] = openpbr["base_color"]
         tint = _combined(_mix, [inputs["baseColor"], 1.0, inputs["sheenTint"]])
-        made["fuzz_color"] = np.broadcast_to(tint, 3) if not isinstance(tint, BaseTexture) else tint
+        openpbr["fuzz_color"] = np.broadcast_to(tint, 3) if not isinstance(tint, BaseTexture) else tint
         if np.any(np.not_equal(inputs["specularTint"], 0)):
             self._lose(title, "specularTint", "")
-        return made
+        return openpbr
 
     def _input(self, title: str, shader: Any, declared: Any) -> Value:
         """Return the value of an input of a shader, by default the declared one; None if it has none."""
@@ -409,7 +411,7 @@ class _Document:
         return value
 
     def _node(self, node: Any, output: str, interface: dict[str, Value], depth: int, kind: str = "") -> Value:
-        """Return the value of a node, of a type where the input has another than the node."""
+        """Return the value of a node, of the type `kind` of the input that reads it, by default its own."""
         if node is None:
             raise Lost("a node that does not exist")
         self.nodes += 1
@@ -512,16 +514,16 @@ def _number(value: Value) -> Any:
     return np.ravel(np.asarray(value, f4))
 
 
-def _combined(function: Callable[..., Any], parts: list[Value]) -> Value:
+def _combined(function: Callable[..., Any], arguments: list[Value]) -> Value:
     """Return a function of numbers, colors and textures."""
-    textures = [argument for argument in parts if isinstance(argument, BaseTexture)]
+    textures = [argument for argument in arguments if isinstance(argument, BaseTexture)]
     known = [
-        argument if isinstance(argument, BaseTexture) else np.asarray(argument, f4) for argument in parts
+        argument if isinstance(argument, BaseTexture) else np.asarray(argument, f4) for argument in arguments
     ]
     ones = all(np.all(argument == 1) for argument in known if not isinstance(argument, BaseTexture))
     if function is operator.mul and len(textures) == 1 and ones:  # a texture keeps what is known of it
         return textures[0]
-    return parts[0] if function is _same else computed(function, *known, rising=False)
+    return arguments[0] if function is _same else computed(function, *known, rising=False)
 
 
 def _converted(document: _Document, wanted: Wanted) -> Value:

@@ -74,10 +74,10 @@ def libraries(files: SceneFiles, lines: Iterable[str]) -> dict[str, MaterialSpec
 def _names(files: SceneFiles, line: str) -> list[str]:
     """Return the material files of a line: one, whose name may contain blanks or be quoted, or several."""
     line = line.strip('"')
-    beside = os.path.join(os.path.dirname(files.name), line)
+    joined = os.path.join(os.path.dirname(files.name), line)
     names = re.split(r"(?<=\.mtl)\s+", line.strip(), flags=re.IGNORECASE)  # in linear time
     several = [name for name in names if name.lower().endswith(".mtl")]
-    return several if len(several) > 1 and not os.path.exists(beside) else [line]
+    return several if len(several) > 1 and not os.path.exists(joined) else [line]
 
 
 def parse(

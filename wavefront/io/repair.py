@@ -64,19 +64,19 @@ class FormOverTime(Deformation):
 
 def with_corner_uvs(raw: RawMesh, corners: Any) -> RawMesh:
     """Return the same mesh with the texture coordinates (k, 2) of the corners of each face."""
-    apart = with_corners_apart(raw)
-    apart.uvs = np.tile(np.asarray(corners, np.float64), (len(raw.faces), 1))
-    return apart
+    split = with_split_corners(raw)
+    split.uvs = np.tile(np.asarray(corners, np.float64), (len(raw.faces), 1))
+    return split
 
 
 def with_face_colors(raw: RawMesh, colors: Table) -> RawMesh:
     """Return the same mesh with colors (m, 4) of its faces: every corner becomes a separate vertex."""
-    apart = with_corners_apart(raw)
-    apart.colors = np.repeat(colors, 3, 0)
-    return apart
+    split = with_split_corners(raw)
+    split.colors = np.repeat(colors, 3, 0)
+    return split
 
 
-def with_corners_apart(raw: RawMesh) -> RawMesh:
+def with_split_corners(raw: RawMesh) -> RawMesh:
     """Return the same mesh with a separate vertex for every corner.
 
     Where there is no such vertex it is NaN, and `build` leaves the face out.

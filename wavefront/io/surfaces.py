@@ -91,8 +91,8 @@ def as_meshes(shapes: Sequence[Shape], name: str, losses: Losses) -> list[Shape]
             out.append(shape)
             continue
         raw.name, raw.material, raw.emission = shape.name, shape.material, shape.emission
-        made = build(name, raw, losses)
-        out += [] if made is None else [made]
+        mesh = build(name, raw, losses)
+        out += [] if mesh is None else [mesh]
     return out
 
 

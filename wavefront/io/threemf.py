@@ -26,7 +26,7 @@ from .description.appearance import MaterialSpec, assign_material
 from .description.contents import Contents
 from .description.placing import Places, in_range
 from .losses import Losses
-from .repair import RawMesh, Table, with_corners_apart
+from .repair import RawMesh, Table, with_split_corners
 from .sources import SceneFiles
 from .xml_checks import check_expanded, look_through
 
@@ -179,7 +179,7 @@ class _Package:
         for group, number in body.groups.items():
             rows = paint[paint[:, 1] == number]
             colors[rows[:, 0]] = self._colors(member, group, rows[:, 2:])
-        raw = with_corners_apart(raw)
+        raw = with_split_corners(raw)
         raw.colors = np.column_stack([colors[sound].reshape(-1, 3), np.ones(raw.faces.size)])
         assign_material(raw, None)
         return raw

@@ -196,11 +196,11 @@ def _is_mesh(subject: Any) -> bool:
     return all(_is_table(element) or (whole and element == []) for element in subject)
 
 
-def _is_table(part: Any) -> bool:
+def _is_table(element: Any) -> bool:
     """Return True for an array, or a list of rows of numbers."""
-    if isinstance(part, np.ndarray):
+    if isinstance(element, np.ndarray):
         return True
-    row = part[0] if isinstance(part, list | tuple) and part else None
+    row = element[0] if isinstance(element, list | tuple) and element else None
     if isinstance(row, np.ndarray):
         return row.ndim == 1
     return isinstance(row, list | tuple) and all(isinstance(cell, Real) for cell in row)
@@ -224,7 +224,7 @@ def _joined(
     smooth: bool | float | str,
     within: tuple[int, ...],
 ) -> Scene:
-    """Return one scene of all; the camera, and what is up, is the first that there is."""
+    """Return one scene of all subjects, with the first camera and the first up axis among them."""
     lights = [subject for subject in subjects if isinstance(subject, Light)]
     bodies = (subject for subject in subjects if not isinstance(subject, Light))
     scenes = [as_scene(subject, material, progress, smooth, within) for subject in bodies]

@@ -75,10 +75,10 @@ class _Textures:
 def _pbr(material: Any) -> MaterialSpec:
     """Read glTF's model; trimesh rounds its colors to 8 bits, and they are linear."""
     texture = _Textures(material)
-    factor = np.asarray(_given(material, "baseColorFactor", np.full(4, 255))) / 255.0
+    factor = np.asarray(_property(material, "baseColorFactor", np.full(4, 255))) / 255.0
     base = texture("baseColorTexture", scale=factor[:3])
     wanted: dict[str, Any] = {"base_color": factor[:3] if base is None else base}
-    cutoff = float(_given(material, "alphaCutoff", 0.5)) if material.alphaMode == "MASK" else None
+    cutoff = float(_property(material, "alphaCutoff", 0.5)) if material.alphaMode == "MASK" else None
     alpha: Any = float(factor[3]) if material.alphaMode in ("MASK", "BLEND") else None
     if alpha is not None and base is not None and base.has_alpha:
         alpha = texture("baseColorTexture", srgb=False, channel=3, scale=alpha)
@@ -87,19 +87,19 @@ def _pbr(material: Any) -> MaterialSpec:
     fill(
         wanted,
         METALLIC_ROUGHNESS,
-        lambda row: float(_given(material, row.theirs, row.default)),
+        lambda row: float(_property(material, row.theirs, row.default)),
         lambda row, value: (
             texture(row.image, srgb=False, channel=row.channel, scale=value) if value else None
         ),
     )
-    made, lost = build_material(wanted, _normal_map(material))
+    built, lost = build_material(wanted, _normal_map(material))
     occluded = ["occlusionTexture"] if material.occlusionTexture is not None else []
     both = bool(material.doubleSided)
-    return MaterialSpec(made, _radiance(material, texture), both, occluded + lost, alpha, cutoff)
+    return MaterialSpec(built, _radiance(material, texture), both, occluded + lost, alpha, cutoff)
 
 
 def _radiance(material: Any, texture: _Textures) -> Any:
-    glow = np.asarray(_given(material, "emissiveFactor", np.zeros(3)), np.float64)
+    glow = np.asarray(_property(material, "emissiveFactor", np.zeros(3)), np.float64)
     if not glow.any():
         return None
     varying = texture("emissiveTexture", scale=glow)
@@ -113,7 +113,7 @@ def _normal_map(material: Any) -> NormalMap | None:
     return NormalMap(Texture(_picture(bumps), False))
 
 
-def _given(material: Any, name: str, default: Any) -> Any:
+def _property(material: Any, name: str, default: Any) -> Any:
     """Return a property of a material, or its default where it is not given."""
     value = getattr(material, name)
     return default if value is None else value

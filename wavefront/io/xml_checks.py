@@ -67,7 +67,7 @@ def check_expanded(name: str, children: Mapping[str, list[str]], sizes: Mapping[
         )
 
 
-def total(name: str, children: Mapping[str, list[str]], own: Callable[[str], int], root: str) -> int:
+def total(name: str, children: Mapping[str, list[str]], count_of: Callable[[str], int], root: str) -> int:
     """Return the sum over all nodes, each counted once for each reference to it.
 
     Parameters
@@ -76,7 +76,7 @@ def total(name: str, children: Mapping[str, list[str]], own: Callable[[str], int
         File name, for messages.
     children
         The nodes that each node refers to or holds; one may occur several times.
-    own
+    count_of
         Returns the count of a node.
     root
         The node to begin with.
@@ -95,7 +95,7 @@ def total(name: str, children: Mapping[str, list[str]], own: Callable[[str], int
             raise SceneError(f"{name}: its nodes are nested deeper than {MAX_DEPTH}")
         if node not in known:
             counts = (below(child, (*above, node)) for child in children.get(node, []))
-            known[node] = own(node) + sum(counts)
+            known[node] = count_of(node) + sum(counts)
         return known[node]
 
     return below(root, ())

@@ -160,14 +160,14 @@ def _amount(name: str, value: float) -> float:
 
 
 def _dispersive(layers: OpenPBRBsdf, scale: float, abbe: float) -> Bsdf:
-    """Return glass with an index for each channel, where there is nothing else, or the layers as they are."""
+    """Return dispersive glass if the layers are clear glass alone, else the layers as they are."""
     scale = number("OpenPBR transmission_dispersion_scale", scale, lambda x: 0 <= x <= 1, "in [0, 1]")
     abbe = _amount("transmission_dispersion_abbe_number", abbe)
     if scale == 0 or abbe == 0 or not layers.transmissive:
         return layers
     index, clear = layers.index_inside, layers.transmission_weight
-    beside = (getattr(layers, key) for key in BESIDE_GLASS)
-    mixed = any(isinstance(parameter, BaseTexture) or np.any(parameter) for parameter in beside)
+    others = (getattr(layers, key) for key in BESIDE_GLASS)
+    mixed = any(isinstance(parameter, BaseTexture) or np.any(parameter) for parameter in others)
     if mixed or isinstance(index, BaseTexture) or isinstance(clear, BaseTexture) or clear != 1:
         warn_caller("OpenPBR: transmission_dispersion_scale is left out where there is more than clear glass")
         return layers

@@ -1,4 +1,4 @@
-"""Daylight coefficients: what each patch of the sky brings to points, from which any sky follows."""
+"""Daylight coefficients: the light of each patch of the sky at points, from which any sky follows."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ ALONG = 4  # squared: directions in which the sky is evaluated in each patch
 
 
 class DaylightCoefficients:
-    """What each patch of the sky brings to points, from `daylight_coefficients`.
+    """The light of each patch of the sky at points, from `daylight_coefficients`.
 
     Parameters
     ----------
@@ -181,10 +181,10 @@ class DaylightCoefficients:
 
 
 def _transmittance(scene: CompiledScene, places: Doubles, toward: Doubles, first: int) -> Floats:
-    """Return the part (n,) of light from infinity that gets to places (n, 3), from unit vectors (n, 3).
+    """Return the transmittance (n,) from infinity to places (n, 3), along unit vectors (n, 3) to the light.
 
-    Alpha and media take their part of it, the luminance of that of each channel. Grids of media draw numbers,
-    other ones for each `first`.
+    Alpha and media count, by the luminance of their transmittance. Grids of media draw random numbers, which
+    differ by `first`.
     """
     n, steps = len(places), None
     origin = np.ascontiguousarray((places * scene.scale - scene.center).T, f4)

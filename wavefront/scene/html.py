@@ -64,9 +64,9 @@ def _material_rows(shapes: Sequence[Shape]) -> list[list[Any]]:
     for shape in shapes:
         users.setdefault(id(shape.material), []).append(shape)
     rows = []
-    for made in users.values():
-        material = made[0].material
-        of = made[0].name if len(made) == 1 else f"{len(made)} shapes"
+    for shapes_of in users.values():
+        material = shapes_of[0].material
+        of = shapes_of[0].name if len(shapes_of) == 1 else f"{len(shapes_of)} shapes"
         rows.append([material.name or "", repr(material.bsdf), of])
     return rows
 

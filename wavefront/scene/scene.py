@@ -425,8 +425,8 @@ class Scene(Answers):
         sin, cos = sin_cos(np.float64(np.radians(fov) / 2))
         half = FILL * float(sin / cos)
         x, y, z = fitting_offset(balls, axes, (half * size[0] / size[1], half))
-        beside, distance = middle + axes[:, 0] * x + axes[:, 1] * y, max(z, MIN_DISTANCE * reach)
-        return Camera.look_at(beside + axes[:, 2] * distance, beside, axes[:, 1], fov, size=size)
+        target, distance = middle + axes[:, 0] * x + axes[:, 1] * y, max(z, MIN_DISTANCE * reach)
+        return Camera.look_at(target + axes[:, 2] * distance, target, axes[:, 1], fov, size=size)
 
     def chosen_view(self, up: ArrayLike = AUTO) -> Doubles | str:
         """Return the view of a camera that frames the scene where none is given: a name, or a direction (3,).
@@ -446,9 +446,9 @@ class Scene(Answers):
             return FRAMING_VIEW
         height = normal @ turn[:, 1]
         normal = normal * np.sign(height if abs(height) > 0.2 else view @ normal or 1.0)
-        beside = view - (view @ normal) * normal
-        beside /= np.linalg.norm(beside)
-        return np.asarray(BROAD * normal + np.sqrt(1 - BROAD * BROAD) * beside)
+        sideways = view - (view @ normal) * normal
+        sideways /= np.linalg.norm(sideways)
+        return np.asarray(BROAD * normal + np.sqrt(1 - BROAD * BROAD) * sideways)
 
     def _hull(self) -> Balls:
         """Return balls whose convex hull holds all shapes, at all times."""

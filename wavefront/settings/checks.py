@@ -298,7 +298,7 @@ def _in_words(values: Mapping[str, Any], name: str) -> str:
     return f"{setting}={in_brief(SHOWN.get(setting, lambda value: value)(values[setting]))}"
 
 
-def told(name: str) -> str:
+def exclusions_of(name: str) -> str:
     """Return the sentences about the settings that do not go with one, for its documentation; "" if none."""
     refused = [rule.other for rule in _both_ways() if rule.refused and rule.one == name]
     unchosen = [rule.other for rule in EXCLUSIONS if not rule.refused and rule.one == name]

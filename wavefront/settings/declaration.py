@@ -53,9 +53,9 @@ from .checks import (
     check_samples,
     check_up,
     check_view,
+    exclusions_of,
     one_of_table,
     optional,
-    told,
     whole_number,
 )
 
@@ -606,7 +606,7 @@ def _declared() -> dict[str, Setting]:
     declared = {
         name: replace(
             get_args(hint)[1],
-            text=get_args(hint)[1].text + told(name),
+            text=get_args(hint)[1].text + exclusions_of(name),
             type=_as_written(AllSettings.__annotations__[name]),
         )
         for name, hint in hints.items()

@@ -297,11 +297,11 @@ def instance_bounds(instances: Sequence[Instance]) -> Doubles:
         vertices = mesh.vertices.take(used, 0).T
         step = max(1, MOST_PLACED // used.size)
         for begin in range(0, len(members), step):
-            some = members[begin : begin + step]
-            transforms = np.stack([instances[at].transform for at in some])
+            batch = members[begin : begin + step]
+            transforms = np.stack([instances[at].transform for at in batch])
             with np.errstate(over="ignore", invalid="ignore"):
                 placed = transforms[:, :3, :3] @ vertices + transforms[:, :3, 3:]
-            out[some, 0], out[some, 1] = placed.min(2), placed.max(2)
+            out[batch, 0], out[batch, 1] = placed.min(2), placed.max(2)
     return out
 
 

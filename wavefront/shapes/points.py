@@ -148,10 +148,10 @@ def usual_radius(points: Doubles) -> float:
     count = len(points)
     if count < 2:
         raise SceneError("a radius for one point is not known, as it has no neighbor: give it a radius")
-    some = points[:: max(1, count // max(LEAST_POINTS, MOST_DISTANCES // count))]
+    sample = points[:: max(1, count // max(LEAST_POINTS, MOST_DISTANCES // count))]
     rank = NEIGHBOR if count > FEW else 1
-    nearest = np.zeros(len(some))
-    for number, point in enumerate(some):
+    nearest = np.zeros(len(sample))
+    for number, point in enumerate(sample):
         away = points - point
         squares = away[:, 0] * away[:, 0] + away[:, 1] * away[:, 1] + away[:, 2] * away[:, 2]
         nearest[number] = np.partition(squares, rank)[rank]

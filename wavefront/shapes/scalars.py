@@ -86,7 +86,7 @@ def with_scalars(shape: Shape, coloring: Coloring) -> Shape:
     values = coloring.values(shape.vertices, {})
     colors, count = coloring.map_of(values), len(shape.vertices)
     check_count(shape.name, values, count, len(shape.faces))
-    shown = copy(shape) if len(values) == count else _apart(shape)
+    shown = copy(shape) if len(values) == count else _with_split_corners(shape)
     shown.uvs = colors.coordinates(values if len(values) == count else np.repeat(values, 3))
     shown.material = map_material(colors)
     return shown
@@ -116,13 +116,13 @@ def _colored(shape: PrimitiveArray, coloring: Coloring) -> PrimitiveArray:
     return shown
 
 
-def _apart(mesh: Mesh) -> Mesh:
+def _with_split_corners(mesh: Mesh) -> Mesh:
     """Return a mesh each of whose corners is a vertex of its own."""
     corners = mesh.faces.ravel()
-    apart = copy(mesh)
+    split = copy(mesh)
     for name in ("vertices", "normals", "uvs", "uvs1", "tangents", "colors"):
         values = getattr(mesh, name)
         if values is not None:
-            setattr(apart, name, values[corners])
-    apart.faces = np.arange(corners.size).reshape(-1, 3)
-    return apart
+            setattr(split, name, values[corners])
+    split.faces = np.arange(corners.size).reshape(-1, 3)
+    return split

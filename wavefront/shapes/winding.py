@@ -19,8 +19,8 @@ def settled(name: str, vertices: Doubles, faces: Ints, normals: Doubles) -> tupl
     normals say. The normals are turned; or the faces, if these enclose a space and all face its inside. A
     warning says which.
     """
-    some = faces[:: max(1, len(faces) // LOOKED_AT)]
-    if not (_opposes(vertices, some, normals) and _opposes(vertices, faces, normals)):
+    sample = faces[:: max(1, len(faces) // LOOKED_AT)]
+    if not (_opposes(vertices, sample, normals) and _opposes(vertices, faces, normals)):
         return faces, normals
     said = f"{name}: the normals point to the back of the faces"
     if _faces_inwards(vertices, faces):
@@ -40,8 +40,8 @@ def _opposes(vertices: Doubles, faces: Ints, normals: Doubles) -> bool:
     """Return whether the normals of nearly all faces (m, 3) with an area oppose them."""
     with np.errstate(over="ignore", invalid="ignore"):
         along = (_areas(vertices, faces) * normals[faces].sum(1)).sum(1)
-    back, some = int((along < 0).sum()), int((along != 0).sum())
-    return back > 0 and back >= NEARLY * some
+    back, sloped = int((along < 0).sum()), int((along != 0).sum())
+    return back > 0 and back >= NEARLY * sloped
 
 
 def _faces_inwards(vertices: Doubles, faces: Ints) -> bool:

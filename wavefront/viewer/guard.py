@@ -81,7 +81,7 @@ class Guard:
         return None
 
 
-def is_own_address(host: str, own: str) -> bool:
+def is_own_address(host: str, served: str) -> bool:
     """Return whether a header Host names this machine.
 
     A page of another site can make its own name lead here (DNS rebinding); then its pages count as those of
@@ -91,7 +91,7 @@ def is_own_address(host: str, own: str) -> bool:
     ----------
     host
         The header.
-    own
+    served
         The host that the server listens at.
     """
     try:
@@ -99,7 +99,7 @@ def is_own_address(host: str, own: str) -> bool:
     except ValueError:
         return False
     machine = socket.gethostname().lower()
-    if name and name in ("localhost", own.lower(), machine, f"{machine}.local"):
+    if name and name in ("localhost", served.lower(), machine, f"{machine}.local"):
         return True
     with suppress(ValueError):
         return bool(ip_address(name))

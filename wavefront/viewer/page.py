@@ -226,13 +226,13 @@ class Page:
         if event.client is not None:  # not the clock
             time = within("time", event.target.value, *watch.span)
             self._playing.value = False
-            self._apart(partial(watch.seek, time))
+            self._in_background(partial(watch.seek, time))
 
     def _play(self, watch: TimeControls, event: Any) -> None:
         if event.client is not None:
-            self._apart(watch.play if event.target.value else watch.pause)
+            self._in_background(watch.play if event.target.value else watch.pause)
 
-    def _apart(self, act: Callable[[], object]) -> None:
+    def _in_background(self, act: Callable[[], object]) -> None:
         """Do what takes longer than the event loop may wait, in the order in which it was asked for."""
         self._acts.submit(self._tried, act)
 

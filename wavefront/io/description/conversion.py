@@ -1,4 +1,4 @@
-"""The conversion of the entities of a scene, each once; what stands for those that are damaged."""
+"""The conversion of the entities of a scene, each once, with replacements for damaged ones."""
 
 from __future__ import annotations
 
@@ -111,8 +111,8 @@ class Conversion:
 
     def stand_in(self, entity: Entity) -> tuple[Callable[[], Any], str]:
         """Return a function that makes the replacement of a damaged entity, and the words for its note."""
-        made, done = self.instead.get(entity.kind, (None, "left out"))
-        return lambda: made, done
+        replacement, done = self.instead.get(entity.kind, (None, "left out"))
+        return lambda: replacement, done
 
     def converted(self, entity: Entity) -> Any:
         """Return the object of an entity, and note the parameters that have no effect."""
@@ -120,15 +120,15 @@ class Conversion:
         if maker.convert is None:
             return self.replaced(entity)
         entity.check()
-        made = maker.convert(entity)
+        converted = maker.convert(entity)
         entity.report()
-        return made
+        return converted
 
     def replaced(self, entity: Entity) -> Any:
         """Return the replacement of an entity that is not supported, which is noted."""
-        made, what = self.instead.get(entity.kind, (None, "left out"))
+        replacement, what = self.instead.get(entity.kind, (None, "left out"))
         entity.lose(what)
-        return made
+        return replacement
 
     def once(self, key: Any, make: Callable[[], Any]) -> Any:
         """Return the object of a key, made at the first call."""
@@ -147,8 +147,8 @@ class Conversion:
             return other, (material, parts)  # these are kept, as the key has their ids
 
         values = (value if isinstance(value, float) else id(value) for value in parts.values())
-        made: Material = self.once((id(material), *parts, *values), make)[0]
-        return made
+        changed_material: Material = self.once((id(material), *parts, *values), make)[0]
+        return changed_material
 
     def picture(self, entity: Entity, reference: str, instead: StoredImage = GRAY_PIXEL) -> StoredImage:
         """Return the image whose file an entity names; a gray one if it is missing or damaged."""
@@ -158,10 +158,10 @@ class Conversion:
     def measured(self, entity: Entity) -> Measured:
         """Return the BSDF of the measured material whose file an entity names."""
         path = self.find(entity.text("filename", ""))
-        made: Measured = self.once(
+        bsdf: Measured = self.once(
             ("measured", path), lambda: Measured.from_bytes(str(path), self.files.read(path))
         )
-        return made
+        return bsdf
 
     def spectrum(self, reference: str) -> list[tuple[float, float]]:
         """Return the wavelengths and values of a file."""
@@ -191,7 +191,7 @@ def only_one(lights: Sequence[Light], losses: Losses) -> list[Light]:
 
 
 def shown(shapes: list[Shape], lights: Sequence[Light], losses: Losses) -> list[Shape]:
-    """Return the shapes of a scene; one that is not seen where there is nothing but light from far away.
+    """Return the shapes of a scene; an invisible sphere if it has nothing but light from far away.
 
     Raises
     ------

@@ -163,7 +163,7 @@ class Entity:
         if maker.reads is not None:
             self.unread.difference_update(maker.reads)
             if self.unread and maker.holds:
-                self.unread.difference_update(name for name, _ in self._held(maker.holds))
+                self.unread.difference_update(name for name, _ in self._children(maker.holds))
             self.report()
 
     def rename(self, old: str, new: str) -> None:
@@ -180,17 +180,17 @@ class Entity:
         """Note that parameters do not change the picture."""
         self.unread.difference_update(names.split())
 
-    def _held(self, kinds: tuple[str, ...]) -> list[tuple[str, Entity]]:
+    def _children(self, kinds: tuple[str, ...]) -> list[tuple[str, Entity]]:
         named = self.values.items()
         return [(name, child) for name, child in named if isinstance(child, Entity) and child.kind in kinds]
 
-    def held(self, kind: str) -> list[Entity]:
+    def children(self, kind: str) -> list[Entity]:
         """Return the entities of a kind that it holds."""
-        return [child for _, child in self._held((kind,))]
+        return [child for _, child in self._children((kind,))]
 
     def only(self, kind: str) -> Entity:
         """Return the first entity of a kind that it must hold."""
-        children = self.held(kind)
+        children = self.children(kind)
         if not children:
             raise SceneError(f"{self.label} holds no {kind}")
         return children[0]

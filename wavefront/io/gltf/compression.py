@@ -38,14 +38,14 @@ def library(name: str, extension: str) -> Any:
         raise SceneError(f"{extension} needs a library: {hint}") from error
 
 
-def unpacked_view(data: bytes, item: dict[str, Any], extension: str, count: int, stride: int) -> bytes:
+def unpacked_view(data: bytes, packed: dict[str, Any], extension: str, count: int, stride: int) -> bytes:
     """Return the bytes of a buffer view that meshoptimizer compressed.
 
     Parameters
     ----------
     data
         The compressed bytes.
-    item, extension
+    packed, extension
         The extension of the view, and its name.
     count, stride
         Elements, and bytes of each.
@@ -55,7 +55,7 @@ def unpacked_view(data: bytes, item: dict[str, Any], extension: str, count: int,
     SceneError
         If they are malformed, or the library is not installed.
     """
-    mode, kind = item.get("mode"), item.get("filter", "NONE")
+    mode, kind = packed.get("mode"), packed.get("filter", "NONE")
     if mode not in MODES or kind not in FILTERS:
         raise SceneError(f"{extension} has the mode {mode!r} and the filter {kind!r}, which there is not")
     meshopt = library("meshopt", extension)
@@ -83,11 +83,11 @@ class DracoMesh:
         If they are malformed, or the library is not installed.
     """
 
-    def __init__(self, data: bytes, item: dict[str, Any], budget: Budget, label: str) -> None:
+    def __init__(self, data: bytes, packed: dict[str, Any], budget: Budget, label: str) -> None:
         draco = library("DracoPy", DRACO)
         faces, points = claimed(data)
         budget.charge(f"{label}: {DRACO}", DRACO_BYTES * (faces + points))
-        self._numbers = item["attributes"]
+        self._numbers = packed["attributes"]
         try:
             self._mesh = draco.decode(data)
             self.indices: NDArray[Any] = np.asarray(self._mesh.faces, np.uint32).ravel()

@@ -108,19 +108,19 @@ class Document:
 
     def get(self, kind: str, index: Any) -> dict[str, Any]:
         """Return element `index` of the array `kind`."""
-        items = self.json.get(kind, [])
-        if not isinstance(items, list):
-            raise SceneError(f"{self.name}: {kind} is {shown(items)}; it must be a list")
-        if not isinstance(index, int) or not 0 <= index < len(items):
-            raise SceneError(f"{self.name}: {kind}[{shown(index)}] does not exist; there are {len(items)}")
-        item = items[index]
-        if not isinstance(item, dict):
+        elements = self.json.get(kind, [])
+        if not isinstance(elements, list):
+            raise SceneError(f"{self.name}: {kind} is {shown(elements)}; it must be a list")
+        if not isinstance(index, int) or not 0 <= index < len(elements):
+            raise SceneError(f"{self.name}: {kind}[{shown(index)}] does not exist; there are {len(elements)}")
+        element = elements[index]
+        if not isinstance(element, dict):
             raise SceneError(f"{self.name}: {kind}[{index}] is not an object")
-        return item
+        return element
 
-    def count(self, where: str, item: dict[str, Any], key: str) -> int:
-        """Return a number of bytes or elements, 0 by default; `where` names the item."""
-        value = item.get(key, 0)
+    def count(self, where: str, element: dict[str, Any], key: str) -> int:
+        """Return a number of bytes or elements, 0 by default; `where` names the element."""
+        value = element.get(key, 0)
         if not isinstance(value, int) or isinstance(value, bool) or not 0 <= value <= MAX_COUNT:
             raise SceneError(
                 f"{self.name}: {where}.{key} is {shown(value)}; it must be a whole number, at least 0"
@@ -144,16 +144,16 @@ class Document:
 
     def buffer(self, index: Any) -> bytes:
         """Return the bytes of a buffer."""
-        item = self.get("buffers", index)
+        buffer = self.get("buffers", index)
         if index not in self._buffers:
             where = f"buffers[{index}]"
-            if "uri" in item:
-                data = self.uri(item["uri"], where)
+            if "uri" in buffer:
+                data = self.uri(buffer["uri"], where)
             elif index == 0 and self._binary is not None:
                 data = self._binary
             else:
                 raise SceneError(f"{self.name}: {where} has no data")
-            claimed = self.count(where, item, "byteLength")
+            claimed = self.count(where, buffer, "byteLength")
             if len(data) < claimed:
                 size = plural(len(data), "byte")
                 self.files.losses.note(
@@ -164,25 +164,25 @@ class Document:
 
     def view(self, index: Any) -> tuple[bytes, int, int, int]:
         """Return (buffer, first byte, end, stride or 0) of a buffer view."""
-        item = self.get("bufferViews", index)
+        view = self.get("bufferViews", index)
         where = f"bufferViews[{index}]"
         with self.inside(where):
-            extension = next((name for name in MESHOPT if name in item.get("extensions", {})), None)
-            if extension is not None and not self._can_do_without(extension, item.get("buffer")):
-                return self._unpack(index, item["extensions"][extension], extension, where)
-            data = self.buffer(item.get("buffer", -1))
-        start, length = self.count(where, item, "byteOffset"), self.count(where, item, "byteLength")
+            extension = next((name for name in MESHOPT if name in view.get("extensions", {})), None)
+            if extension is not None and not self._can_do_without(extension, view.get("buffer")):
+                return self._unpack(index, view["extensions"][extension], extension, where)
+            data = self.buffer(view.get("buffer", -1))
+        start, length = self.count(where, view, "byteOffset"), self.count(where, view, "byteLength")
         if start + length > len(data):
             raise SceneError(
                 f"{self.name}: {where} ends at byte {start + length}; its buffer has {len(data)}"
             )
-        return data, start, start + length, self.count(where, item, "byteStride")
+        return data, start, start + length, self.count(where, view, "byteStride")
 
     def _can_do_without(self, extension: str, buffer: Any) -> bool:
         """Return whether a compressed view has its bytes in a buffer, too, and no library unpacks it."""
-        item = self.get("buffers", buffer)
-        plain = "uri" in item or (buffer == 0 and self._binary is not None)
-        if not plain or item.get("extensions", {}).get(extension, {}).get("fallback"):
+        element = self.get("buffers", buffer)
+        plain = "uri" in element or (buffer == 0 and self._binary is not None)
+        if not plain or element.get("extensions", {}).get(extension, {}).get("fallback"):
             return False
         return find_spec("meshopt") is None
 
@@ -200,19 +200,19 @@ class Document:
 
     def accessor(self, index: Any) -> NDArray[Any]:
         """Return the elements of an accessor, (count, width); normalized integers become float32."""
-        item = self.get("accessors", index)
+        accessor = self.get("accessors", index)
         where = f"accessors[{index}]"
         with self.inside(where):
-            values = self._elements(item, where)
-            return normalized(values) if item.get("normalized") else values
+            values = self._elements(accessor, where)
+            return normalized(values) if accessor.get("normalized") else values
 
-    def _elements(self, item: dict[str, Any], where: str) -> NDArray[Any]:
-        kind, width = COMPONENTS.get(item.get("componentType", 0)), WIDTHS.get(item.get("type", ""))
-        count = self.count(where, item, "count")
+    def _elements(self, accessor: dict[str, Any], where: str) -> NDArray[Any]:
+        kind, width = COMPONENTS.get(accessor.get("componentType", 0)), WIDTHS.get(accessor.get("type", ""))
+        count = self.count(where, accessor, "count")
         if kind is None or width is None:
             raise SceneError(
-                f"{self.name}: {where} is {shown(item.get('type'))} of {shown(item.get('componentType'))}, "
-                "which glTF does not have"
+                f"{self.name}: {where} is {shown(accessor.get('type'))} of "
+                f"{shown(accessor.get('componentType'))}, which glTF does not have"
             )
         scale = max(1, self.files.limits.triangles // MAX_TRIANGLES)  # where the user allows larger meshes
         if count * width > MAX_ELEMENTS * scale:
@@ -226,20 +226,20 @@ class Document:
                 f"so far; the limit is {MAX_NUMBERS * scale}"
             )
         self.files.budget.charge(f"{self.name}: {where}", count * width * NUMBER_BYTES)
-        if "bufferView" in item:
-            values = self._strided(item, count, width, kind, where)
+        if "bufferView" in accessor:
+            values = self._strided(accessor, count, width, kind, where)
         else:
             values = np.zeros((count, width), kind)
-        return self._sparse(item["sparse"], values, where) if "sparse" in item else values
+        return self._sparse(accessor["sparse"], values, where) if "sparse" in accessor else values
 
     def _strided(
-        self, item: dict[str, Any], count: int, width: int, kind: type[np.generic], where: str
+        self, accessor: dict[str, Any], count: int, width: int, kind: type[np.generic], where: str
     ) -> NDArray[Any]:
-        """Return the elements (count, width) of an item's buffer view, from its offset on."""
-        data, start, end, stride = self.view(item["bufferView"])
+        """Return the elements (count, width) of an accessor's buffer view, from its offset on."""
+        data, start, end, stride = self.view(accessor["bufferView"])
         size = np.dtype(kind).itemsize * width
         stride = stride or size
-        start += self.count(where, item, "byteOffset")
+        start += self.count(where, accessor, "byteOffset")
         if count and start + (count - 1) * stride + size > end:
             elements = plural(count, "element")
             raise SceneError(f"{self.name}: {where} has {elements}, which its buffer view cannot hold")

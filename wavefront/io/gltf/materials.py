@@ -53,9 +53,9 @@ class GltfMaterials:
         """
         if index is not None and (not isinstance(index, int) or index not in self._specs):
             with self._document.part(f"materials[{shown(index)}]", "the default material in its place"):
-                item = self._document.get("materials", index)
-                where = f"materials[{index}]" + (f" {item['name']!r}" if "name" in item else "")
-                spec = self._specs[index] = _Reader(self, item, where).spec()
+                material = self._document.get("materials", index)
+                where = f"materials[{index}]" + (f" {material['name']!r}" if "name" in material else "")
+                spec = self._specs[index] = _Reader(self, material, where).spec()
                 for what in spec.lost:
                     self._document.lose(what, where)
         return self._specs.get(index, self._default) if isinstance(index, int) else self._default
@@ -70,8 +70,8 @@ class GltfMaterials:
         document = self._document
         if not isinstance(info, dict):
             raise SceneError(f"{document.name}: {where} is {shown(info)}; it must be an object")
-        item = document.get("textures", info.get("index"))
-        image = self._image(_source(item), where, instead)
+        texture = document.get("textures", info.get("index"))
+        image = self._image(_source(texture), where, instead)
         if image is None:
             return None
         move = info.get("extensions", {}).get("KHR_texture_transform", {})
@@ -80,7 +80,7 @@ class GltfMaterials:
             document.lose(f"TEXCOORD_{uv_set}", where)
         sampler, transform = {}, None
         with document.part(f"{where}: its sampler"):
-            sampler = document.get("samplers", item["sampler"]) if "sampler" in item else {}
+            sampler = document.get("samplers", texture["sampler"]) if "sampler" in texture else {}
         with document.part(f"{where}: KHR_texture_transform"):
             transform = _uv_matrix(move) if move else None
         return Texture(
@@ -101,19 +101,19 @@ class GltfMaterials:
 
     def _image(self, index: int, where: str, instead: StoredImage | None) -> StoredImage | None:
         """Return an image, decoded once, or `instead`, which is noted, if it cannot be read."""
-        item = self._document.get("images", index)
+        element = self._document.get("images", index)
         if index not in self._images:
-            read = lambda: self._decoded(item, f"images[{index}]")  # noqa: E731
-            image = self._document.files.shown(_called(item, index), read, where, instead)
+            read = lambda: self._decoded(element, f"images[{index}]")  # noqa: E731
+            image = self._document.files.shown(_called(element, index), read, where, instead)
             self._images[index] = None if image is instead else image
         return self._images[index] or instead
 
-    def _decoded(self, item: dict[str, Any], place: str) -> StoredImage:
+    def _decoded(self, element: dict[str, Any], place: str) -> StoredImage:
         document = self._document
-        files, uri = document.files, item.get("uri")
-        name = f"{document.name}: {place}" + (f" {item['name']!r}" if "name" in item else "")
-        if "bufferView" in item:
-            data, start, end, _ = document.view(item["bufferView"])
+        files, uri = document.files, element.get("uri")
+        name = f"{document.name}: {place}" + (f" {element['name']!r}" if "name" in element else "")
+        if "bufferView" in element:
+            data, start, end, _ = document.view(element["bufferView"])
             image = files.decoded(name, data[start:end])
         elif not isinstance(uri, str):
             raise SceneError(f"{name} has neither a uri nor a bufferView")
@@ -130,28 +130,28 @@ class GltfMaterials:
         return image
 
 
-def _source(item: dict[str, Any]) -> Any:
+def _source(texture: dict[str, Any]) -> Any:
     """Return the number of the image of a texture."""
-    extensions = item.get("extensions", {})
+    extensions = texture.get("extensions", {})
     if WEBP in extensions:
         return extensions[WEBP].get("source")
-    if "source" not in item:
+    if "source" not in texture:
         raise SceneError(f"its image is given by {', '.join(extensions) or 'nothing'}, which is not read")
-    return item["source"]
+    return texture["source"]
 
 
-def _called(item: dict[str, Any], index: int) -> str:
+def _called(element: dict[str, Any], index: int) -> str:
     """Return the name of an image in messages."""
-    uri = item.get("uri")
-    known = uri if isinstance(uri, str) and not uri.startswith("data:") else item.get("name")
+    uri = element.get("uri")
+    known = uri if isinstance(uri, str) and not uri.startswith("data:") else element.get("name")
     return f"images[{index}]" if known is None else str(known)
 
 
 class _Reader:
     """Reads one material."""
 
-    def __init__(self, materials: GltfMaterials, item: dict[str, Any], where: str) -> None:
-        self._materials, self._item, self._where = materials, item, where
+    def __init__(self, materials: GltfMaterials, material: dict[str, Any], where: str) -> None:
+        self._materials, self._json, self._where = materials, material, where
         self._document = materials._document
         self._file, self._losses = self._document.name, self._document.files.losses
         self._wanted: dict[str, Any] = {}
@@ -161,7 +161,7 @@ class _Reader:
 
     def spec(self) -> MaterialSpec:
         """Return the appearance of the material."""
-        extensions = self._item.get("extensions", {})
+        extensions = self._json.get("extensions", {})
         normal_map = self._normal_map()
         if "KHR_materials_pbrSpecularGlossiness" in extensions:
             self._specular_glossiness(extensions["KHR_materials_pbrSpecularGlossiness"])
@@ -171,14 +171,14 @@ class _Reader:
                 if name not in BESIDE
             ]
         else:
-            self._metallic_roughness(self._item.get("pbrMetallicRoughness", {}))
+            self._metallic_roughness(self._json.get("pbrMetallicRoughness", {}))
             self._extended(extensions)
         radiance = self._emission(extensions.get("KHR_materials_emissive_strength", {}))
         material, lost = build_material(self._wanted, normal_map)
         if radiance is not None:
             material.efficacy = OF_CANDELA
-        material.name = printable(str(self._item["name"])) if self._item.get("name") else None
-        both = bool(self._item.get("doubleSided"))
+        material.name = printable(str(self._json["name"])) if self._json.get("name") else None
+        both = bool(self._json.get("doubleSided"))
         return MaterialSpec(material, radiance, both, self._lost + lost, self._alpha_given, self._cutoff)
 
     def _extended(self, extensions: dict[str, Any]) -> None:
@@ -266,7 +266,7 @@ class _Reader:
 
     def _alpha(self, group: dict[str, Any], key: str, factor: float, base: Texture | None) -> None:
         """Read the opacity of a base color: a factor, and the fourth channel of the texture `key`."""
-        mode = self._item.get("alphaMode", "OPAQUE")
+        mode = self._json.get("alphaMode", "OPAQUE")
         if mode not in ("OPAQUE", "MASK", "BLEND"):
             place = f"{self._where}.alphaMode"
             self._losses.note(
@@ -275,7 +275,7 @@ class _Reader:
         if mode not in ("MASK", "BLEND"):
             return
         if mode == "MASK":
-            self._cutoff = self._number(self._item, "alphaCutoff", 0.5, high=np.inf)
+            self._cutoff = self._number(self._json, "alphaCutoff", 0.5, high=np.inf)
         alpha: Any = factor
         if base is not None and base.has_alpha:
             alpha = self._texture(group, key, srgb=False, channel=3, scale=factor)
@@ -284,14 +284,14 @@ class _Reader:
             self._wanted |= {"alpha": alpha} | ({"alpha_cutoff": self._cutoff} if mode == "MASK" else {})
 
     def _normal_map(self) -> NormalMap | None:
-        if "occlusionTexture" in self._item:
+        if "occlusionTexture" in self._json:
             self._lost.append("occlusionTexture")
-        texture = self._texture(self._item, "normalTexture", srgb=False)
+        texture = self._texture(self._json, "normalTexture", srgb=False)
         if texture is None:
             return None
         where = f"{self._where}.normalTexture"
         with self._document.part(where):
-            scale = floats(f"{where}.scale", [self._item["normalTexture"].get("scale", 1)], 1)[0]
+            scale = floats(f"{where}.scale", [self._json["normalTexture"].get("scale", 1)], 1)[0]
             return NormalMap(texture, scale)
         return None
 
@@ -300,8 +300,8 @@ class _Reader:
             self._lost.append(f"ior {self._wanted.pop('ior'):g}")
 
     def _wall(self, group: dict[str, Any]) -> None:
-        """Make what light passes thin, unless it has a volume."""
-        volume = self._item["extensions"].get("KHR_materials_volume")
+        """Make a transmissive material thin, unless it has a volume."""
+        volume = self._json["extensions"].get("KHR_materials_volume")
         thick = volume is not None and self._number(volume, "thicknessFactor", 0.0, high=np.inf) > 0
         if "transmission" in self._wanted and not thick:
             self._wanted["thin"] = True
@@ -359,15 +359,15 @@ class _Reader:
                 self._wanted["absorption"] = -log(np.maximum(color, 1e-6).astype(np.float32)) / distance
 
     def _emission(self, strength: dict[str, Any]) -> Doubles | Texture | None:
-        factor = self._color(self._item, "emissiveFactor", [0.0, 0.0, 0.0], high=FLOAT32_MAX)
+        factor = self._color(self._json, "emissiveFactor", [0.0, 0.0, 0.0], high=FLOAT32_MAX)
         if (factor > 1).any():
             place = f"{self._where}.emissiveFactor"
             self._losses.note(place, value=f"{factor.tolist()}, above 1", done="taken as it is")
         factor = factor * self._number(strength, "emissiveStrength", 1.0, high=FLOAT32_MAX)
         if not factor.any():
             return None
-        texture = self._texture(self._item, "emissiveTexture", scale=factor)
-        if texture is None and "emissiveTexture" in self._item:  # most such images are dark
+        texture = self._texture(self._json, "emissiveTexture", scale=factor)
+        if texture is None and "emissiveTexture" in self._json:  # most such images are dark
             return None
         return factor if texture is None else texture
 

@@ -100,14 +100,14 @@ class _Reader:
 
     def _unpacked(self) -> DracoMesh | None:
         """Return the mesh that Draco compressed; None without one, or if it is there uncompressed, too."""
-        item, document = self._json.get("extensions", {}).get(DRACO), self._document
-        if item is None:
+        packed, document = self._json.get("extensions", {}).get(DRACO), self._document
+        if packed is None:
             return None
         plain = all("bufferView" in document.get("accessors", i) for i in self._attributes.values())
         if plain and find_spec("DracoPy") is None:
             return None
-        data, start, end, _ = document.view(item["bufferView"])
-        return DracoMesh(data[start:end], item, document.files.budget, f"{document.name}: {self._place}")
+        data, start, end, _ = document.view(packed["bufferView"])
+        return DracoMesh(data[start:end], packed, document.files.budget, f"{document.name}: {self._place}")
 
     def _faces(self, mode: int) -> Faces:
         """Return the triangles."""
@@ -129,9 +129,9 @@ class _Reader:
     def _values(self, key: str, widths: int | tuple[int, ...]) -> NDArray[Any] | None:
         """Return an attribute of the primitive, None if there is none."""
         if self._draco is not None and key in self._draco and key in self._attributes:
-            item = self._document.get("accessors", self._attributes[key])
+            accessor = self._document.get("accessors", self._attributes[key])
             values = self._draco.values(key)
-            values = normalized(values) if item.get("normalized") else values
+            values = normalized(values) if accessor.get("normalized") else values
             return checked(key, values, widths, self._where, self._count)
         return attribute(self._document, self._attributes, key, widths, self._where, self._count)
 
@@ -231,5 +231,5 @@ def _triangles(where: str, indices: NDArray[Any], mode: int, count: int) -> Face
     odd = (place[:-2] - begin) % 2 == 1
     if mode == STRIP:
         faces[odd] = faces[odd][:, [1, 0, 2]]  # every second triangle of a strip has the opposite orientation
-    apart = (first != second) & (second != third) & (third != first)  # degenerate triangles join strips
-    return faces[apart & ~restart[:-2] & ~restart[1:-1] & ~restart[2:]]
+    distinct = (first != second) & (second != third) & (third != first)  # degenerate triangles join strips
+    return faces[distinct & ~restart[:-2] & ~restart[1:-1] & ~restart[2:]]

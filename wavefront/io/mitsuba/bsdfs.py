@@ -104,7 +104,7 @@ def _metal(entity: Entity) -> str:
 
 @plugin("twosided", "bsdf", holds="bsdf", harmless="allow_transmission")
 def _two_sided(entity: Entity) -> Material:
-    front, *back = entity.held("bsdf") or [entity.only("bsdf")]
+    front, *back = entity.children("bsdf") or [entity.only("bsdf")]
     material = _inner(front)
     if not back or back[0] is front:
         return material
@@ -142,7 +142,7 @@ def _filter(entity: Entity) -> Material:
 
 @plugin("blendbsdf", "bsdf", "weight", holds="bsdf texture")
 def _blend(entity: Entity) -> Material:
-    bsdfs = entity.held("bsdf")
+    bsdfs = entity.children("bsdf")
     if len(bsdfs) != 2:
         raise SceneError(f"holds {len(bsdfs)} bsdfs; it needs two")
     first, second = (_inner(bsdf) for bsdf in bsdfs)
@@ -331,7 +331,7 @@ _model(
 def is_one_sided(entity: Entity) -> bool:
     """Return whether the back of a BSDF is black."""
     if entity.type in ("mask", "bumpmap", "normalmap", "blendbsdf"):
-        return all(is_one_sided(child) for child in entity.held("bsdf"))
+        return all(is_one_sided(child) for child in entity.children("bsdf"))
     if entity.type == "principled":
         passing = entity.values.get("spec_trans", 0.0)
         return isinstance(passing, int | float) and passing == 0

@@ -54,8 +54,8 @@ def convert(
     """
     job = Job(name, files, find, read_mesh)
     job.instead["film"] = DEFAULT_FILM, "the default in its place"
-    made: Contents = job.convert(Graph(name, job, version).build(scene))
-    return made
+    contents: Contents = job.convert(Graph(name, job, version).build(scene))
+    return contents
 
 
 DEFINED = "bsdf texture sampler film rfilter medium phase volume"  # for others to refer to
@@ -64,7 +64,7 @@ DEFINED = "bsdf texture sampler film rfilter medium phase volume"  # for others 
 @plugin("scene", "scene", "", f"shape emitter sensor integrator {DEFINED}", "allow_thread_reordering")
 def _scene(entity: Entity) -> Contents:
     job = entity.job
-    entities = [child for child in entity.held("shape") if child.type != "shapegroup"]
+    entities = [child for child in entity.children("shape") if child.type != "shapegroup"]
     seen = _sensors(entity, entities)
     camera, settings = seen[0][2] if seen else (None, {})
     measures = bool(seen) and (camera is None or isinstance(camera, Sensors))
@@ -99,11 +99,11 @@ def _shutter(sensor: Entity, elements: list[Any]) -> dict[str, Any]:
 
 
 def _sensors(entity: Entity, entities: list[Entity]) -> list[tuple[Entity, Entity, Any]]:
-    """Return the sensors of a scene and of its shapes: each with what holds it, its camera and its settings.
+    """Return the sensors of a scene and of its shapes: each with its holder, its camera and its settings.
 
     The first one counts.
     """
-    sensors = [(sensor, holder) for holder in (entity, *entities) for sensor in holder.held("sensor")]
+    sensors = [(sensor, holder) for holder in (entity, *entities) for sensor in holder.children("sensor")]
     seen = [(*pair, view) for pair in sensors if (view := entity.job.convert(pair[0])) is not None]
     for sensor, *_ in seen[1:]:
         entity.lose(f"the further sensor {sensor.type!r}")
@@ -114,7 +114,7 @@ def _followed(entity: Entity, camera: Camera | None, measures: bool) -> dict[str
     """Return the settings of the integrator; what it and the camera see is told to the job."""
     job = entity.job
     job.eye = None if camera is None else camera.origin
-    integrators = entity.held("integrator")
+    integrators = entity.children("integrator")
     job.sees_media = not integrators or sees_media(integrators[0])
     followed: dict[str, Any] = job.convert(integrators[0]) if integrators else {}
     job.hides_lamps = "background" in followed and not measures
@@ -124,9 +124,9 @@ def _followed(entity: Entity, camera: Camera | None, measures: bool) -> dict[str
 
 
 def _lights(entity: Entity) -> list[Light]:
-    lamps = [lamp for lamp in entity.held("emitter") if lamp.type != "area"]
-    made = [(lamp, light) for lamp in lamps if (light := entity.job.convert(lamp)) is not None]
-    lists = [(lamp, converted if isinstance(converted, list) else [converted]) for lamp, converted in made]
+    lamps = [lamp for lamp in entity.children("emitter") if lamp.type != "area"]
+    pairs = [(lamp, light) for lamp in lamps if (light := entity.job.convert(lamp)) is not None]
+    lists = [(lamp, converted if isinstance(converted, list) else [converted]) for lamp, converted in pairs]
     return [light for lamp, lights in lists for light in moved(lamp, lights)]
 
 

@@ -45,7 +45,7 @@ def _homogeneous(entity: Entity) -> Medium:
 
 def phase_of(entity: Entity) -> PhaseFunction:
     """Return the phase function that a medium holds; isotropic without one."""
-    phases: list[PhaseFunction] = [entity.job.convert(child) for child in entity.held("phase")]
+    phases: list[PhaseFunction] = [entity.job.convert(child) for child in entity.children("phase")]
     return phases[0] if phases else Isotropic()
 
 
@@ -75,7 +75,7 @@ plugin("hg", "phase", "g")(lambda entity: HenyeyGreenstein(entity.number("g", 0.
 @plugin("blendphase", "phase", "weight", "phase")
 def _blend(entity: Entity) -> PhaseFunction:
     first, second = [
-        entity.job.convert(child) for child in (*entity.held("phase"), *[entity.only("phase")] * 2)
+        entity.job.convert(child) for child in (*entity.children("phase"), *[entity.only("phase")] * 2)
     ][:2]
     return PhaseMix(first, second, entity.number("weight", 0.5))
 
@@ -153,7 +153,7 @@ def interior_of(entity: Entity, hollow: bool) -> BaseMedium | None:
     inside, outside = (_medium(entity, name) for name in ("interior", "exterior"))
     if inside is None:
         return entity.job.once("hole", lambda: Medium(0.0)) if hollow and outside is not None else None
-    return _made(inside)
+    return _medium_of(inside)
 
 
 def _medium(entity: Entity, name: str) -> Entity | None:
@@ -161,12 +161,12 @@ def _medium(entity: Entity, name: str) -> Entity | None:
     return value if isinstance(value, Entity) and value.kind == "medium" else None
 
 
-def _made(entity: Entity) -> BaseMedium | None:
-    """Return a medium; equal ones are one."""
-    made: BaseMedium | None = entity.job.once(
+def _medium_of(entity: Entity) -> BaseMedium | None:
+    """Return the medium of a plugin; equal plugins share one."""
+    medium: BaseMedium | None = entity.job.once(
         ("medium", _content(entity)), lambda: entity.job.convert(entity)
     )
-    return made
+    return medium
 
 
 def _content(value: Any) -> Any:
@@ -189,22 +189,25 @@ def medium_around(entity: Entity, sensor: Entity | None) -> BaseMedium | None:
     """
     if not entity.job.sees_media:
         return None
-    shapes = list(_shapes(entity.held("shape")))
+    shapes = list(_shapes(entity.children("shape")))
     filled = [(shape, medium) for shape in shapes if (medium := _medium(shape, "interior")) is not None]
     inside = [_content(medium) for _, medium in filled]
     outside = {repr(_content(outer)): outer for shape in shapes if (outer := _medium(shape, "exterior"))}
-    apart = [outer for outer in outside.values() if _content(outer) not in inside]
+    separate = [outer for outer in outside.values() if _content(outer) not in inside]
     if sensor is None:
-        around, what = (apart[0] if apart else None), "another medium around all shapes"
+        around, what = (separate[0] if separate else None), "another medium around all shapes"
     else:
-        around, what = next(iter(sensor.held("medium")), None), "the medium outside, where the sensor is not"
+        around, what = (
+            next(iter(sensor.children("medium")), None),
+            "the medium outside, where the sensor is not",
+        )
     content = None if around is None else _content(around)
-    for outer in apart:
+    for outer in separate:
         if _content(outer) != content:
             outer.lose(what)
     if around is None or any(_content(medium) == content and _holds(shape) for shape, medium in filled):
         return None
-    return _made(around)
+    return _medium_of(around)
 
 
 def _holds(shape: Entity) -> bool:
@@ -220,4 +223,4 @@ def _shapes(nodes: Iterable[Entity]) -> Iterator[Entity]:
     """Yield shapes, and those in groups."""
     for entity in nodes:
         yield entity
-        yield from _shapes(entity.held("shape"))
+        yield from _shapes(entity.children("shape"))

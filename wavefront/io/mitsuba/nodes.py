@@ -34,7 +34,7 @@ unsupported = TABLE.unsupported
 def plugin(
     names: str, kind: str, reads: str = "", holds: str = "", harmless: str = "", note: str = ""
 ) -> Callable[[C], C]:
-    """Put a function that converts plugins into the table, which says all that counts of them."""
+    """Put a function that converts plugins into the table, with the names of their parameters."""
     return TABLE.converts(kind, names, reads, holds, harmless, note)
 
 
@@ -49,7 +49,7 @@ class Job(Conversion):
 
     def stand_in(self, entity: Entity) -> tuple[Callable[[], Any], str]:
         """Return the bsdf that a damaged bsdf holds, or the replacement of the plugin's kind."""
-        bsdfs = entity.held("bsdf") if entity.kind == "bsdf" else []
+        bsdfs = entity.children("bsdf") if entity.kind == "bsdf" else []
         if bsdfs and bsdfs[0] not in self.making:
             return lambda: self.convert(bsdfs[0]), "the bsdf in it in its place"
         return super().stand_in(entity)
@@ -173,13 +173,13 @@ class Graph:
             hint = did_you_mean(kind, TABLE.kinds) if isinstance(kind, str) else ""
             what = f"there is no plugin {in_brief(kind)}{self._version}{hint}"
             self._kept[key] = {"type": "diffuse"}, source  # where it holds itself
-            made = self._substitute(source)
-            made = None if made is None else self._known(made, place)
-            if made is None:
+            substitute = self._substitute(source)
+            substitute = None if substitute is None else self._known(substitute, place)
+            if substitute is None:
                 del self._kept[key]
                 raise SceneError(f"{place}: {what}")
-            self._lost.note(what, place, done=f"a {made['type']} in its place")
-            self._kept[key] = made, source
+            self._lost.note(what, place, done=f"a {substitute['type']} in its place")
+            self._kept[key] = substitute, source
         return self._kept[key][0]
 
     def _substitute(self, source: Mapping[str, Any]) -> Mapping[str, Any] | None:

@@ -57,7 +57,7 @@ def read_serialized(name: str, data: bytes, index: int, files: SceneFiles) -> Ra
     SceneError
         If the file is malformed, or its header claims more than the limits allow.
     """
-    version, begin = _found(name, data, index)
+    version, begin = _mesh_start(name, data, index)
     stream = _Stream(name, data[begin + 4 :])
     (flags,) = struct.unpack("<I", stream.read(4))
     label = b""
@@ -75,7 +75,7 @@ def read_serialized(name: str, data: bytes, index: int, files: SceneFiles) -> Ra
     return RawMesh(label.decode("utf-8", "replace"), points, corners, normals, uvs, colors=colors)
 
 
-def _found(name: str, data: bytes, index: int) -> tuple[int, int]:
+def _mesh_start(name: str, data: bytes, index: int) -> tuple[int, int]:
     """Return the version of a file, and the byte where a mesh begins."""
     if len(data) < 8:
         raise SceneError(f"{name}: has {len(data)} bytes, too few for a serialized mesh")

@@ -91,7 +91,7 @@ def _cylinder(entity: Entity) -> list[Shape]:
     axes, matrix = frame(end - start), to_world(entity)
     material, emission = _appearance(entity)
     around = np.linalg.norm(matrix[:3, :3] @ axes[:, :2], axis=0)
-    needs_faces = emission is not None or entity.held("sensor") or entity.flag("flip_normals")
+    needs_faces = emission is not None or entity.children("sensor") or entity.flag("flip_normals")
     even = abs(around[1] - around[0]) <= ROUND * around[0]
     if even and not needs_faces and not textures_in(material, Texture) and not _has_grain(material):
         ends = np.stack([start, end]) @ matrix[:3, :3].T + matrix[:3, 3]
@@ -122,7 +122,7 @@ def _sphere(entity: Entity) -> list[Shape]:
         left, _, right = np.linalg.svd(matrix[:3, :3])
         turn = left @ right @ POLES
     improper, name = turn is not None and mirrored, entity.name or "sphere"
-    made = Sphere(
+    sphere = Sphere(
         center,
         radius,
         material=material,
@@ -131,8 +131,8 @@ def _sphere(entity: Entity) -> list[Shape]:
         name=name,
     )
     if not (inward or improper or (emission is not None and material.opacity is not None)):
-        return [made]
-    raw = facing(ball(made, turn), reverse=inward)
+        return [sphere]
+    raw = facing(ball(sphere, turn), reverse=inward)
     return _built(entity, replace(raw, name=name, material=material, emission=emission))
 
 
@@ -151,7 +151,7 @@ def _placed_ball(entity: Entity) -> tuple[Doubles, float, Matrix]:
 @plugin("obj ply", "shape", f"{SURFACE} filename face_normals flip_tex_coords", PARTS)
 def _file(entity: Entity) -> list[Shape]:
     path = entity.job.find(entity.text("filename"))
-    raw = entity.job.once(path, lambda: _one(str(path), entity.job.read_mesh(path)))
+    raw = entity.job.once(path, lambda: _merged(str(path), entity.job.read_mesh(path)))
     raw = with_attribute(entity.job.name, replace(raw), entity)
     if entity.flag("flip_tex_coords", entity.type == "obj") and raw.uvs is not None:
         raw = replace(raw, uvs=raw.uvs * (1, -1) + (0, 1))
@@ -188,9 +188,9 @@ def _distance_grid(entity: Entity) -> list[Shape]:
 @plugin("shapegroup merge", "shape", holds="shape")
 def _group(entity: Entity) -> list[Shape]:
     """Return its shapes, which are placed by instances."""
-    for sensor in (sensor for child in entity.held("shape") for sensor in child.held("sensor")):
+    for sensor in (sensor for child in entity.children("shape") for sensor in child.children("sensor")):
         sensor.lose("left out, as it is in a group")
-    return [shape for child in entity.held("shape") for shape in entity.job.convert(child)]
+    return [shape for child in entity.children("shape") for shape in entity.job.convert(child)]
 
 
 @plugin("instance", "shape", "to_world", holds="shape")
@@ -259,9 +259,9 @@ def angle_normals(vertices: Doubles, faces: Ints) -> Doubles:
     return np.nan_to_num(np.stack(sums, 1))  # of vertices that are not finite; their faces are left out
 
 
-def _reads(thing: Any) -> set[str]:
+def _reads(appearance: Any) -> set[str]:
     """Return the fields of surfaces that the textures of a material or an emission read."""
-    textures: list[BaseTexture] = textures_in(thing)
+    textures: list[BaseTexture] = textures_in(appearance)
     return {name for texture in textures for name in texture.reads}
 
 
@@ -272,7 +272,7 @@ def _has_grain(material: Material) -> bool:
 
 def _appearance(entity: Entity, closed: bool = False, bent: bool = False) -> tuple[Material, Any]:
     """Return the material and the emission of a shape; `bent` where it has normals other than its own."""
-    bsdfs, emitters = entity.held("bsdf"), entity.held("emitter")
+    bsdfs, emitters = entity.children("bsdf"), entity.children("emitter")
     for extra in (*bsdfs[1:], *emitters[1:]):
         entity.lose(f"a second {extra.kind}")
     emission = _emission(entity, emitters[0]) if emitters else None
@@ -306,7 +306,7 @@ def _emission(entity: Entity, emitter: Entity) -> Any:
 
 
 def _shining(alpha: Any, emission: Any) -> tuple[Any, Any]:
-    """Return the opacity and the radiance of a surface all of whose light is seen, whatever its opacity."""
+    """Return the opacity and the radiance of a surface whose light is seen in full, whatever its opacity."""
     opacity = alpha if isinstance(alpha, BaseTexture) else float(np.ravel(alpha)[0])
     alpha = computed(_at_least, opacity, LEAST_OPACITY)
     return alpha, computed(_quotient, emission, alpha, rising=False)
@@ -320,7 +320,7 @@ def _quotient(a: Any, b: Any) -> Any:
     return a / b
 
 
-def _one(name: str, raws: list[RawMesh]) -> RawMesh:
+def _merged(name: str, raws: list[RawMesh]) -> RawMesh:
     """Return all meshes of a file as one."""
     if not raws:
         raise SceneError(f"{name}: has no faces")
@@ -352,7 +352,7 @@ def _box(matrix: Matrix) -> tuple[Doubles, Doubles]:
 
 
 def _for_spheres(material: Material, emission: Any, job: Job) -> tuple[Material, Any]:
-    """Return the same with its textures turned over: v of a `Sphere` is 1 where Mitsuba's is 0."""
+    """Return both with their textures upside down: v of a `Sphere` is 1 where Mitsuba's is 0."""
     both = (material, emission)
     key = (*map(id, both), "sphere")
     if key not in job.made:

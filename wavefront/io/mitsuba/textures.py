@@ -50,7 +50,7 @@ def root(alpha: Any) -> Any:
 def color(entity: Entity, name: str, default: Any, use: Use = "albedo") -> Value:
     """Return a parameter that is a number, a color or a texture, clamped to the range of its use."""
     return entity.or_default(
-        default, lambda: _within(entity, name, as_color(_given(entity, name, default), use), use)
+        default, lambda: _within(entity, name, as_color(_parameter(entity, name, default), use), use)
     )
 
 
@@ -65,12 +65,12 @@ def _within(entity: Entity, name: str, value: Value, use: Use) -> Value:
     return texture_within(entity.lost, name, value, most, entity.label)
 
 
-def as_color(made: Any, use: Use) -> Value:
+def as_color(converted: Any, use: Use) -> Value:
     """Return the value of a texture; of a spectrum, its color."""
-    return made.color(use) if isinstance(made, Spectrum) else made
+    return converted.color(use) if isinstance(converted, Spectrum) else converted
 
 
-def _given(entity: Entity, name: str, default: Any) -> Any:
+def _parameter(entity: Entity, name: str, default: Any) -> Any:
     """Return a parameter that is a number, a color, a texture, or a `Spectrum`."""
     value = entity.get(name, default)
     if not isinstance(value, Entity):
@@ -157,18 +157,18 @@ plugin("mesh_attribute", "texture", "name scale", note="one for each shape, of p
 def _uniform(entity: Entity) -> Any:
     value = entity.get("value", 1.0)
     if isinstance(value, Entity) or np.ndim(value) == 0:
-        return _given(entity, "value", 1.0)
+        return _parameter(entity, "value", 1.0)
     return entity.vector("value", None)
 
 
-plugin("srgb", "texture", "color", harmless="unbounded")(lambda entity: _given(entity, "color", 1.0))
+plugin("srgb", "texture", "color", harmless="unbounded")(lambda entity: _parameter(entity, "color", 1.0))
 
 
 @plugin("d65", "texture", "color scale", "texture")
 def _d65(entity: Entity) -> Any:
     """Return a color, or the texture in it; D65 itself is white."""
-    inside = entity.held("texture")
-    base = entity.job.convert(inside[0]) if inside else _given(entity, "color", 1.0)
+    inside = entity.children("texture")
+    base = entity.job.convert(inside[0]) if inside else _parameter(entity, "color", 1.0)
     factor = entity.number("scale", 1.0)
     if isinstance(base, BaseTexture | Spectrum):
         if factor != 1:
@@ -243,8 +243,8 @@ def _board(entity: Entity, channel: int | None = None) -> Texture:
 
 
 def _field(entity: Entity, name: str, default: float) -> Value:
-    """Return a color as it is: what reads the texture knows its range."""
-    return entity.or_default(default, lambda: as_color(_given(entity, name, default), "albedo"))
+    """Return a color as it is; the reader of the texture clamps it."""
+    return entity.or_default(default, lambda: as_color(_parameter(entity, name, default), "albedo"))
 
 
 unsupported("texture", "volume")

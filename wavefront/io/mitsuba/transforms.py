@@ -51,15 +51,15 @@ def to_world(entity: Entity) -> Matrix:
     return entity.or_default(np.eye(4), lambda: _checked(entity, "to_world"))
 
 
-def moved(entity: Entity, made: list[Any]) -> list[Any]:
+def moved(entity: Entity, converted: list[Any]) -> list[Any]:
     """Return the objects of a plugin, moving by its `to_world` if that is a motion."""
     motion = entity.values.get("to_world")
     if not isinstance(motion, Motion):
-        return made
+        return converted
     with entity.lost.part(entity.label, "its motion left out; it stands where it begins"):
         from_start = Product(motion, np.asarray(np.linalg.inv(motion.at(motion.start)), np.float64))
-        return [element.transformed(from_start) for element in made]
-    return made
+        return [element.transformed(from_start) for element in converted]
+    return converted
 
 
 def plain(value: Any) -> Any:

@@ -65,9 +65,9 @@ def _sensor(entity: Entity) -> tuple[Camera, Settings]:
 
 def _picture(entity: Entity) -> tuple[tuple[int, int], Crop, Settings]:
     """Return the size, the crop and the settings of the picture of a sensor."""
-    film = entity.held("film")
+    film = entity.children("film")
     size, crop, settings = entity.job.convert(film[0]) if film else DEFAULT_FILM
-    for sampler in entity.held("sampler"):
+    for sampler in entity.children("sampler"):
         settings = settings | entity.job.convert(sampler)
     return size, crop, settings
 
@@ -117,7 +117,7 @@ def _film(entity: Entity) -> tuple[tuple[int, int], Crop, Settings]:
         left, top = (left, top) if left < width and top < height else (0, 0)
         right, bottom = min(right, width), min(bottom, height)
     whole = (left, top, right, bottom) == (0, 0, width, height)
-    filters = entity.held("rfilter")
+    filters = entity.children("rfilter")
     settings = dict(entity.job.convert(filters[0]) if filters else USUAL)
     pixels = "rgb" if entity.type == "specfilm" else entity.choice("pixel_format", "rgb", PIXELS)
     if not pixels.startswith("rgb"):
@@ -180,7 +180,7 @@ def _integrator(entity: Entity) -> Settings:
 
 def sees_media(integrator: Entity) -> bool:
     """Return whether an integrator sees media: those that follow paths from surface to surface do not."""
-    return integrator.type not in SURFACES and all(map(sees_media, integrator.held("integrator")))
+    return integrator.type not in SURFACES and all(map(sees_media, integrator.children("integrator")))
 
 
 unsupported("integrator", "depth stokes emission_reparam volprim_rf_basic")

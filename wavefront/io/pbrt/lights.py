@@ -145,7 +145,7 @@ def summed(lights: list[Light], losses: Losses) -> list[Light]:
     even = [light for light in around if isinstance(light.record(np.zeros(3)), ConstantEnvironment)]
     if len(even) > 1:
         total = Environment(np.sum([light.radiance[:, 0] for light in even], 0))
-        lights = [total, *(each for each in lights if each not in even)]
+        lights = [total, *(light for light in lights if light not in even)]
     return only_one(lights, losses)
 
 
@@ -223,7 +223,7 @@ def sphere_to_square(d: Doubles) -> tuple[Doubles, Doubles]:
 
 
 def _by_longitude(pixels: Floats, to_light: Doubles) -> Floats:
-    """Return an image of `Environment` (n, 2n, 3) of one that is equal-area (n, n, 3)."""
+    """Return an equal-area image (n, n, 3) by longitude and latitude (n, 2n, 3), as `Environment` has it."""
     size, padded = len(pixels), _padded(pixels)
     out = np.empty((size, 2 * size, 3), np.float32)
     turns = (np.arange(2 * size * SUBPIXELS) + 0.5) / (2 * size * SUBPIXELS) - 0.5

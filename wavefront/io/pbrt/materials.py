@@ -67,7 +67,7 @@ def _index(entity: Entity, name: str, default: float = 1.5) -> Any:
     return float(value) if np.ndim(value) == 0 else value
 
 
-def _made(entity: Entity, bsdf: Any) -> Material:
+def _with_bumps(entity: Entity, bsdf: Any) -> Material:
     """Return a material with the bumps of its entity."""
     bumps: Any = None
     file = entity.text("normalmap", "")
@@ -88,7 +88,7 @@ def _made(entity: Entity, bsdf: Any) -> Material:
 def _surface(types: str, harmless: str = "") -> Callable[[Callable[[Entity], Bsdf]], Any]:
     """Put a function that returns the BSDF of materials into the table."""
     add = converts("material", types, harmless=harmless)
-    return lambda make: add(lambda entity: _made(entity, make(entity)))
+    return lambda make: add(lambda entity: _with_bumps(entity, make(entity)))
 
 
 @_surface("coateddiffuse subsurface", harmless="maxdepth nsamples")
@@ -120,13 +120,13 @@ def _coat(thickness: float, ior: float) -> tuple[float, ...]:
 
 
 def _below_coat(base: Any, entry: Any, leaving: Any, back: Any, clear: Any) -> Any:
-    """Return the reflectance below a clear coat that brings as much light out as this base below its coat."""
+    """Return the base that reflects as much below a clear coat as this base below its absorbing coat."""
     out = entry * leaving * base / (1 - back * base)
     return out / (1 - clear + clear * out)
 
 
 def _layer(entity: Entity) -> float:
-    """Return the thickness of what is between two layers, which only absorbs."""
+    """Return the thickness of the medium between two layers; it only absorbs."""
     for name in ("albedo", "g"):
         value = color(entity, name, 0.0)
         if isinstance(value, BaseTexture) or np.any(value):
@@ -140,7 +140,7 @@ def _layer(entity: Entity) -> float:
 
 @_surface("coatedconductor", harmless="maxdepth nsamples")
 def _coated_conductor(entity: Entity) -> Principled:
-    """Return a metal with a clear coat, which is as it would be in the coat."""
+    """Return a metal with a clear coat; its reflectance is that inside of the coat."""
     eta, k = _metal(entity, "conductor.")
     _layer(entity)
     coat, metal = (_roughness(entity, f"{name}.") for name in ("interface", "conductor"))

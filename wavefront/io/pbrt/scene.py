@@ -36,7 +36,7 @@ MOST_OPEN = 4096  # attribute blocks inside each other
 
 @dataclass(frozen=True, eq=False)
 class State:
-    """The graphics state: what is in force for the shapes that follow."""
+    """The graphics state, which holds for the shapes that follow."""
 
     matrices: Doubles = field(
         default_factory=lambda: np.tile(np.eye(4), (2, 1, 1))
@@ -137,16 +137,16 @@ class Reader:
             upgrade(entity)
         return entity
 
-    def _moved(self, entity: Entity, made: Any) -> Any:
+    def _moved(self, entity: Entity, converted: Any) -> Any:
         """Return the object of an entity; it moves between its transforms as AnimatedTransform of pbrt."""
         ends = self.ends.get(id(entity))
-        if ends is None or made is None:
-            return made
+        if ends is None or converted is None:
+            return converted
         with self.job.files.losses.part(entity.label, "its motion left out; it stands where it begins"):
-            moving = made.transformed(self._between(ends))
+            moving = converted.transformed(self._between(ends))
             self.moves = True
             return moving
-        return made
+        return converted
 
     def _between(self, ends: Doubles) -> Motion:
         """Return the motion from where something stands at its first transform, in the space of the scene."""
@@ -158,15 +158,15 @@ class Reader:
         still = np.array([np.array_equal(*ends) for ends in uses])
         shapes: list[Any] = place_object(self.objects[name], self.job, uses[still, 0]) if still.any() else []
         for ends in uses[~still]:
-            made = place_object(self.objects[name], self.job, ends[:1])
+            moving = place_object(self.objects[name], self.job, ends[:1])
             with self.job.files.losses.part(f"ObjectInstance {name!r}", "its motion left out"):
-                made = [shape.transformed(self._between(ends)) for shape in made]
+                moving = [shape.transformed(self._between(ends)) for shape in moving]
                 self.moves = True
-            shapes += made
+            shapes += moving
         return shapes
 
     def _noted(self, entity: Entity) -> Entity:
-        """Return an entity whose motion is noted: between which transforms it moves, if it does."""
+        """Return an entity, and keep the two transforms between which it moves, if it does."""
         if not np.array_equal(*self.state.matrices):
             if self.open_object is None:
                 self.ends[id(entity)] = self.state.matrices

@@ -18,7 +18,7 @@ from ..description.computed import clipped, computed, product
 from ..description.conversion import placed, textures_in
 from ..description.entity import ABOVE_0, Entity, Limit
 from ..description.placing import facing, in_range, moved_raw
-from ..repair import RawMesh, build, existing, with_corner_uvs, with_corners_apart
+from ..repair import RawMesh, build, existing, with_corner_uvs, with_split_corners
 from ..surfaces import RINGS, SIDES, over_square
 from ..trimesh_library import import_trimesh
 from .entities import Job, converts, placement, unsupported
@@ -182,10 +182,10 @@ def place_object(entities: Sequence[Entity], job: Job, matrices: Matrix) -> list
             job.count_instances(len(matrices))
             if entity.state.area is not None:
                 entity.lose("the light of a shape in an object")
-            made = _shapes(entity, placement(entity), None, even)
-            if any(_mappings(shape.material) for shape in made):
+            placed_shapes = _shapes(entity, placement(entity), None, even)
+            if any(_mappings(shape.material) for shape in placed_shapes):
                 entity.lose("where its instances are; all have the texture coordinates of the object")
-            shapes += made
+            shapes += placed_shapes
     label = entities[0].label if entities else job.name
     with job.files.losses.part(label), placed(label):
         return list(Group(shapes).placed(job.world @ matrices @ np.linalg.inv(job.world)))
@@ -240,7 +240,7 @@ def _with_coordinates(entity: Entity, raw: RawMesh) -> RawMesh:
         first, *more = mappings.values()
         if more:
             entity.lose("a second mapping by the place; the first one in its place")
-        raw = replace(with_corners_apart(raw), uvs1=first.at_corners(raw.vertices, raw.faces))
+        raw = replace(with_split_corners(raw), uvs1=first.at_corners(raw.vertices, raw.faces))
     return raw
 
 
@@ -273,7 +273,7 @@ def _area(raw: RawMesh) -> float:
     return float(np.linalg.norm(np.cross(b - a, c - a), axis=1).sum()) / 2
 
 
-def _mappings(thing: Any) -> dict[Any, Mapping]:
+def _mappings(appearance: Any) -> dict[Any, Mapping]:
     """Return the mappings by the place of the textures of a material or an emission."""
-    mappings = (texture.mapping for texture in textures_in(thing, Mapped))
+    mappings = (texture.mapping for texture in textures_in(appearance, Mapped))
     return {mapping.key: mapping for mapping in mappings if mapping.coordinates is not None}

@@ -19,7 +19,7 @@ from ..clouds import cloud
 from ..description.appearance import MaterialSpec, assign_material, from_srgb, is_faint
 from ..description.contents import Contents
 from ..losses import Losses
-from ..repair import RawMesh, Table, with_corners_apart
+from ..repair import RawMesh, Table, with_split_corners
 from ..rows import NAME, NONE, Faces, Rows, bad_rows, faces_of_rows, note_damage, note_rows
 from ..sources import GRAY, SceneFiles
 from .header import RGB, read_header, unread
@@ -119,13 +119,13 @@ def _with_uvs_of_corners(files: SceneFiles, raw: RawMesh, rows: dict[str, Rows],
     wrong = (counts != 2 * corners) & ~bad_rows(face)
     done = "0 in place of texture coordinates"
     note_rows(files.losses, face, wrong, "with texture coordinates that do not fit the corners", done)
-    apart = with_corners_apart(raw)
+    split = with_split_corners(raw)
     begin = np.cumsum(counts) - counts, np.cumsum(corners) - corners
     at = begin[0][faces.row][:, None] + 2 * (faces.corner - begin[1][faces.row][:, None])
     at = np.where(wrong[faces.row][:, None], len(values), at).ravel()
     padded = np.append(values.astype(np.float64), [0.0, 0.0])
-    apart.uvs = np.stack([padded[at], padded[at + 1]], 1)
-    return apart
+    split.uvs = np.stack([padded[at], padded[at + 1]], 1)
+    return split
 
 
 def _colors(rows: Rows | None) -> Table | None:
@@ -158,13 +158,13 @@ def _colored(files: SceneFiles, raw: RawMesh, rows: dict[str, Rows], faces: Face
                 files.losses.note(f"{what} colors")
         return raw
     if of_faces is not None and (of_vertices is None or (of_vertices == 1).all()):
-        raw = with_corners_apart(raw)
+        raw = with_split_corners(raw)
         raw.colors = np.repeat(of_faces[faces.row], 3, 0)
     elif of_vertices is not None:
         if of_faces is not None:
             files.losses.note("face colors")
-        apart = len(raw.vertices) != len(of_vertices)
-        raw.colors = of_vertices[faces.triangles.ravel()] if apart else of_vertices
+        is_split = len(raw.vertices) != len(of_vertices)
+        raw.colors = of_vertices[faces.triangles.ravel()] if is_split else of_vertices
     if is_faint(raw):  # where it has no effect
         files.losses.note("opacity of vertex colors")
     return raw

@@ -145,15 +145,15 @@ def _with_common_limits(blocks: list[Any], look: Look) -> Look:
         return look
     arrays = [_array(block, look) for block in blocks if hasattr(block, "point_data")]
     values = [lengths("scalars", array) for array in arrays if array is not None and array.dtype != np.uint8]
-    some = [numbers[np.isfinite(numbers)] for numbers in values if np.isfinite(numbers).any()]
-    if not some:
+    finite_arrays = [numbers[np.isfinite(numbers)] for numbers in values if np.isfinite(numbers).any()]
+    if not finite_arrays:
         return look
-    limits = min(finite.min() for finite in some), max(finite.max() for finite in some)
+    limits = min(finite.min() for finite in finite_arrays), max(finite.max() for finite in finite_arrays)
     return replace(look, coloring=replace(coloring, clim=limits))
 
 
 def _with_array(data: Any, look: Look) -> tuple[Any, Look]:
-    """Return a dataset that has the numbers that are given for it, by a name."""
+    """Return a dataset with the numbers that are given for it as one of its arrays."""
     if look.coloring is None or look.coloring.scalars is None or isinstance(look.coloring.scalars, str):
         return data, look
     values = lengths("scalars", look.coloring.scalars)
@@ -184,7 +184,7 @@ def _of_triangles(data: Any) -> Any:
 
 
 def _starts(flat: Ints) -> Ints:
-    """Return where the rows of polygons, a count and the indices, begin."""
+    """Return the starts of the rows of polygons; a row is a count and the indices."""
     width = int(flat[0]) + 1 if flat.size else 1
     if not flat.size % width and (flat[::width] == width - 1).all():
         return np.arange(0, flat.size, width)
@@ -196,7 +196,7 @@ def _starts(flat: Ints) -> Ints:
 
 
 def _cut(data: Any, flat: Ints, starts: Ints) -> Any:
-    """Return the same where VTK leaves out polygons, such as those that touch themselves."""
+    """Return PolyData of triangles, also of polygons that VTK leaves out, as they touch themselves."""
     counts, corners = flat[starts], np.delete(flat, starts)
     corner, polygon = triangulate(np.asarray(data.points, np.float64), corners, counts)
     cut = type(data)(np.asarray(data.points), faces=np.insert(corners[corner], 0, 3, axis=1).ravel())

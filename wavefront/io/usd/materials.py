@@ -121,11 +121,11 @@ class Materials:
             if "displayColor" in tint:
                 color = np.clip(tint["displayColor"], 0, 1)
             if "displayOpacity" in tint:
-                alpha = _part(*tint["displayOpacity"])
+                alpha = _opacity(*tint["displayOpacity"])
             self._made[key] = Look(Material(Diffuse(color), alpha=alpha))
-        made = self._made[key].material
-        assert made is not None
-        return made
+        material = self._made[key].material
+        assert material is not None
+        return material
 
     def _converted(self, bound: Any, tint: Tint) -> Look:
         shader, *_ = bound.ComputeSurfaceSource()
@@ -167,7 +167,7 @@ class Materials:
         return bytes(asset.GetBuffer())
 
 
-def _part(alpha: float) -> float | None:
+def _opacity(alpha: float) -> float | None:
     """Return an opacity, None where it is complete."""
     return None if alpha >= 1 else max(alpha, 0.0)
 

@@ -134,7 +134,7 @@ class Meshes:
         return False
 
     def _primvars(self, prim: Any, look: Look) -> dict[str, tuple[str, Any, str]]:
-        """Return names, values and interpolation of what a mesh has for a look, by field of a `RawMesh`."""
+        """Return name, values and interpolation of the primvars of a look, by the fields of a `RawMesh`."""
         usual = {"normals": "normals", "uvs": self._first_coordinates(prim)}
         if look.material is None:
             usual |= {"colors": "displayColor", OPACITY: "displayOpacity"}

@@ -193,17 +193,19 @@ class _Reader:
         counts = [len(matrices) for _, matrices, _ in self.placed]
         numbers = np.repeat(np.array([index for index, *_ in self.placed], np.intp), counts)
         matrices = np.concatenate([np.zeros((0, 4, 4)), *(transforms for _, transforms, _ in self.placed)])
-        materials = [made for *_, made in self.placed]
+        materials = [material for *_, material in self.placed]
         places = Places(numbers, matrices)
-        if any(made is not None for made in materials):
+        if any(material is not None for material in materials):
             counted = zip(materials, counts, strict=True)
-            places.materials = [made for made, count in counted for _ in range(count)]
+            places.materials = [material for material, count in counted for _ in range(count)]
         up = str(UsdGeom.GetStageUpAxis(self.stage)).lower()
         span = None if self.codes is None else (self.codes[0] / self.rate, self.codes[1] / self.rate)
         return Contents(self.raws, places, self.lights, self.camera, self.shapes, up=up, span=span)
 
     def _count(self, top: Any, above: tuple[str, ...]) -> int:
-        """Return how much is placed with a prim, before any is: instancers may place instancers.
+        """Return the number of prims that are placed with a prim, before any is placed.
+
+        Instancers may place instancers.
 
         Raises
         ------
@@ -301,11 +303,11 @@ class _Reader:
             self.shapes += [self._ball(prim, matrix, tint) for matrix in matrices]
         elif kind in LAMPS:
             lamps = (Lamp(self.materials, prim, matrix, self.unit).light() for matrix in matrices)
-            for made in lamps:
-                if isinstance(made, Light):
-                    self.lights.append(made)
-                elif made is not None:
-                    self.shapes.append(made)
+            for light in lamps:
+                if isinstance(light, Light):
+                    self.lights.append(light)
+                elif light is not None:
+                    self.shapes.append(light)
         elif kind == "Camera":
             self._camera(prim, matrices[0])
         else:
@@ -414,9 +416,9 @@ class _Reader:
         if key not in self.of_prim:
             first = len(self.raws)
             with np.errstate(all="ignore"):
-                made = self.meshes.of(prim, without)
-            self.raws += [raw for _, raw in made]
-            self.of_prim[key] = [(first + i, bound) for i, (bound, _) in enumerate(made)]
+                meshes = self.meshes.of(prim, without)
+            self.raws += [raw for _, raw in meshes]
+            self.of_prim[key] = [(first + i, bound) for i, (bound, _) in enumerate(meshes)]
         return self.of_prim[key]
 
     def _camera(self, prim: Any, matrix: Matrix) -> None:

@@ -17,7 +17,7 @@ from .keywords import CHANNELS, LEFT_OUT, OPTIONS, Kind, is_image, keyword_of, m
 
 
 class Image(NamedTuple):
-    """What a line says of an image."""
+    """The options and the file of an image, from its line."""
 
     options: dict[str, list[str]]  # the words of each
     reference: str  # the name of the file, which may contain spaces
@@ -127,8 +127,8 @@ class Entry:
         values = self.numbers(key)
         return default if values is None else values[0]
 
-    def part(self, key: str, default: float) -> float:
-        """Return a number, clamped to the range of its keyword with a warning."""
+    def clamped(self, key: str, default: float) -> float:
+        """Return a number, clamped to the range of its keyword, which is noted."""
         value, high = self.number(key, default), keyword_of(key).high
         if not 0 <= value <= high:
             self.note(key, exact(value), f"clamped, as it must be in [0, {high:g}]")

@@ -116,7 +116,7 @@ def _wanted(entry: Entry) -> dict[str, Any]:
     fill(
         wanted,
         PBR,
-        lambda row: entry.part(row.theirs, row.default) if entry.has(row.theirs) else None,
+        lambda row: entry.clamped(row.theirs, row.default) if entry.has(row.theirs) else None,
         lambda row, factor: entry.texture(row.image, factor),
     )
     return wanted | {"alpha": _alpha(entry)}
@@ -132,7 +132,7 @@ def _glass(entry: Entry) -> Dielectric:
     _opacity(entry)
     ior = entry.number("ni", GLASS_IOR)
     entry.read.update(("d", "tr", "kd"))  # glass has no matte part, but files give it a Kd
-    return Dielectric(ior, entry.part("pr", 0.0), transmittance=entry.color("tf", 1.0))
+    return Dielectric(ior, entry.clamped("pr", 0.0), transmittance=entry.color("tf", 1.0))
 
 
 def _alpha(entry: Entry) -> Any:
@@ -163,13 +163,15 @@ def _normal_or_bump_map(entry: Entry) -> BaseNormalMap | None:
     for key in BUMPS:
         if key in entry.lines:
             is_normal = key == "norm" or _looks_like_normals(entry, key)
-            made = _made(entry, key, _normal_map if is_normal else _bump_map)
-            if made is not None:
-                return made
+            bumps = _bumps(entry, key, _normal_map if is_normal else _bump_map)
+            if bumps is not None:
+                return bumps
     return None
 
 
-def _made(entry: Entry, key: str, make: Callable[[Entry, str], BaseNormalMap | None]) -> BaseNormalMap | None:
+def _bumps(
+    entry: Entry, key: str, make: Callable[[Entry, str], BaseNormalMap | None]
+) -> BaseNormalMap | None:
     try:
         return make(entry, key)
     except SceneError as error:
