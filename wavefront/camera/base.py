@@ -44,7 +44,7 @@ _FRAMED: list[Callable[..., Any]] = []
 
 
 def register_framing(choose: Callable[..., Any]) -> None:
-    """Let `Camera.framing` call what chooses the camera of a render: (scene, view, fov, size, up)."""
+    """Let `Camera.framing` call the function that chooses a camera: (scene, view, fov, size, up)."""
     _FRAMED[:] = [choose]
 
 
@@ -416,7 +416,7 @@ class Camera(Moving, Answers):
         aperture: float = 0,
         focus: float | None = None,
     ) -> Camera:
-        """Return the camera that `render` would choose for a scene, to be changed and given to it.
+        """Return the camera that `render` would choose for a scene, to change it and pass it to `render`.
 
         Parameters
         ----------
@@ -462,7 +462,7 @@ class Camera(Moving, Answers):
         crop: Window | None = None,
         rolling_shutter: float | None = None,
     ) -> Camera:
-        """Return a camera of which some things differ; what is not given stays.
+        """Return a camera with other values of some parameters; those that are not given stay.
 
         Parameters
         ----------
@@ -771,7 +771,7 @@ class Camera(Moving, Answers):
         return {"rolling_shutter": self.rolling_shutter} if self.rolling_shutter else {}
 
     def row_delay(self, pixel: Words) -> Doubles:
-        """Return how much later than the first row those of pixels (n,) of the whole picture are read, s."""
+        """Return the delays (n,) after the first row with which pixels of the whole picture are read, s."""
         width, height = self.resolution
         row = (pixel // np.uint32(width)).astype(np.float64)
         read = self.rolling_shutter
@@ -967,7 +967,7 @@ def _axes_of(convention: str) -> tuple[int, int, int]:
 
 
 def _calibration(K: ArrayLike, size: tuple[int, int], pixel_centers: str) -> tuple[float, dict[str, Any]]:
-    """Return the focal length, pixels of the height, and what else projections take of a matrix K (3, 3).
+    """Return the focal length, in pixels of the height, and the other parameters of a matrix K (3, 3).
 
     Raises
     ------

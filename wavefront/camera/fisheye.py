@@ -128,7 +128,7 @@ class Fisheye(Projection):
         return lens
 
     def rays(self, x: Floats, y: Floats, size: Size, lens: Floats | None) -> tuple[Floats | None, Floats]:
-        """Return rays through the film, or from lens points to what is in focus; NaN outside."""
+        """Return rays through the film, or from lens points to the points in focus; NaN outside."""
         (cx, cy), (fx, fy) = self.intrinsics(size)
         down = (y.astype(np.float64) - cy) / fy
         right = (x.astype(np.float64) - cx) / fx - self.skew * down
@@ -158,7 +158,7 @@ class Fisheye(Projection):
         return np.stack([(u + self.skew * v) * fx + cx, v * fy + cy]), distance
 
     def in_focus(self, points: Doubles, offset: Doubles) -> Doubles:
-        """Return where rays from lens points through the points meet the sphere of focus."""
+        """Return the points where rays from lens points through points meet the sphere of focus."""
         if not self.uses_lens or self.focus is None:
             return points
         way = points - offset

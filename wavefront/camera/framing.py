@@ -1,4 +1,4 @@
-"""Where a camera of a given direction stands so that things fill its picture.
+"""The place of a camera of a given direction whose picture shapes fill.
 
 Objects are spheres, mostly points: a picture contains what their convex hull contains.
 """
@@ -19,7 +19,7 @@ Balls = tuple[Doubles, Doubles]  # centers (n, 3) and radii (n,)
 
 
 def fitting_offset(balls: Balls, axes: Doubles, tangents: tuple[float, float]) -> Doubles:
-    """Return where a pinhole camera stands that sees all balls, from the origin along its axes, (3,).
+    """Return the place (3,), from the origin along its axes, of a pinhole camera that sees all balls.
 
     All that touches an edge of the picture lies in a plane through the camera, whose place follows from the
     farthest ball along the plane's normal. The two planes of the width and those of the height each give a
@@ -64,7 +64,7 @@ class _Side:
 
 
 def _middle(side: _Side, other: _Side, tangent: float, distance: float) -> float:
-    """Return the offset from which things reach as far to both sides, at a distance."""
+    """Return the offset from which balls reach equally far to both sides, at a distance."""
     narrow = 0.0
     for _ in range(STEPS):  # for the tangent at which both planes meet at that distance
         (a, depth_a), (b, depth_b) = side.touching(narrow), other.touching(narrow)

@@ -1,4 +1,4 @@
-"""Mappings of fisheye lenses: how far from the axis a ray is seen, by its angle to the view axis.
+"""Mappings of fisheye lenses: the distance from the axis of a ray's image, by its angle to the view axis.
 
 Distances are in focal lengths, angles in radians. Source of the polynomial: J. Kannala and S. Brandt, "A
 Generic Camera Model and Calibration Method for Conventional, Wide-Angle, and Fish-Eye Lenses", IEEE PAMI

@@ -273,7 +273,7 @@ class Perspective(Projection):
         return np.stack([(x + self.skew * y) * focal[0] + middle[0], y * focal[1] + middle[1]]), depth
 
     def in_focus(self, points: Doubles, offset: Doubles) -> Doubles:
-        """Return where rays from lens points through the points meet the plane of focus."""
+        """Return the points where rays from lens points through points meet the plane of focus."""
         if not self.uses_lens:
             return points
         ahead = np.where(points[2] < 0, -points[2], np.nan)

@@ -84,7 +84,7 @@ class Sensors(Camera):
 
     @property
     def extent(self) -> Doubles:
-        """(k, 3) points that the sensors are between, scene units."""
+        """(k, 3) points whose box contains the sensors, scene units."""
         return self.points
 
     def above(self, bounds: Doubles) -> Self:

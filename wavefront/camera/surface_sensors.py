@@ -68,7 +68,7 @@ class SurfaceSensors(Sensors):
 
     @property
     def extent(self) -> Doubles:
-        """(k, 3) points that the surfaces are between, scene units."""
+        """(k, 3) points whose box contains the surfaces, scene units."""
         return self.triangles.reshape(-1, 3)
 
     def layers(self) -> dict[str, NDArray[Any]]:

@@ -185,7 +185,7 @@ def _summary(image: Image, path: str) -> str:
 
 
 def _resume(path: str, parser: argparse.ArgumentParser) -> int:
-    """Give the command that began a render once more; return the exit status."""
+    """Run the command that began a render again; return the exit status."""
     with contents_of(path):
         command = read_header(path)["command"]
         if command is None:

@@ -1,4 +1,4 @@
-"""What reading files may take: memory for a picture, an archive or a scene, checked before it is taken."""
+"""Limits of the memory that files take: for a picture, an archive or a scene, checked beforehand."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ def in_memory(path: str | os.PathLike[str]) -> Iterator[None]:
 
 
 class Budget:
-    """What the files of one scene or picture may take together. A file of a few bytes can claim any size.
+    """The memory that the files of one scene or picture may take. A file of a few bytes can claim any size.
 
     Parameters
     ----------

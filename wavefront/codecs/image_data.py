@@ -1,4 +1,4 @@
-"""What files hold of a picture: arrays by name, and the rest as JSON."""
+"""The content of files of pictures: arrays by name, and the rest as JSON."""
 
 from __future__ import annotations
 

@@ -94,7 +94,7 @@ class _Tensors:
         return field in self._fields
 
     def take(self, field: str, shape: tuple[int | None, ...], code: str = "f4") -> NDArray[Any]:
-        """Return the array of a field, which must have the shape, None for at least 1 or in tables 2."""
+        """Return the array of a field of a shape, in which None is any length (at least 1, in tables 2)."""
         if field not in self._fields:
             raise SceneError(f"{self.name}: has no field {field!r}")
         place, kind, start, have = self._fields[field]

@@ -29,7 +29,7 @@ class ColorMap:
     log: bool = False  # whether the logarithms of the numbers are what counts
 
     def places(self, values: Doubles) -> Doubles:
-        """Return how far along the table numbers (...) are, 0 to 1 within it; NaN where one is not finite."""
+        """Return the places of numbers (...) in the table, 0 to 1 within it; NaN where one is not finite."""
         low, high = self.limits
         if self.log:
             with np.errstate(divide="ignore", invalid="ignore"):
@@ -46,7 +46,7 @@ class ColorMap:
         return srgb(codes.astype(np.uint8))
 
     def picture(self) -> NDArray[np.uint8]:
-        """Return a picture (2, k, 4) of the table, above a row of the color of what is no number."""
+        """Return a picture (2, k, 4) of the table, above a row of the color of NaN."""
         return np.stack([self.table, np.broadcast_to(np.array(self.no_number, np.uint8), self.table.shape)])
 
     def coordinates(self, values: Doubles) -> Doubles:

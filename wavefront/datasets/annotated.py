@@ -1,4 +1,4 @@
-"""What a data set says of the shapes of a scene: their names, categories, models and poses."""
+"""The annotations of the shapes of a scene: their names, categories, models and poses."""
 
 from __future__ import annotations
 

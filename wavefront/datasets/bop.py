@@ -173,7 +173,7 @@ def _info(whole: Mask, seen: Mask, depth: NDArray[np.uint16]) -> dict[str, Any]:
 
 
 def _wide_silhouettes(view: DatasetView) -> Iterator[tuple[int, Mask]]:
-    """Yield the silhouettes of shapes in a picture that goes on by its own size beyond each edge.
+    """Yield the silhouettes of shapes in a picture that is three times as wide and high.
 
     So far BOP's tools look for what an edge has cut off.
     """

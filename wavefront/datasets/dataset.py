@@ -44,7 +44,7 @@ class Layout(Protocol):
         """Check that a camera can be described."""
 
     def write_view(self, view: DatasetView) -> Any:
-        """Write the files of a view; return what the index needs of it, as values of JSON."""
+        """Write the files of a view; return its entry of the index, as values of JSON."""
 
     def write_index(self, views: dict[int, Any]) -> None:
         """Write the files that describe all views."""

@@ -15,7 +15,7 @@ from .view import DatasetView
 
 
 class FlowLayout:
-    """What layouts with flow have in common: each view but the last one of a camera has flow to the next one.
+    """Base class of layouts with flow: each view but the last one of a camera has flow to the next one.
 
     Parameters
     ----------
@@ -71,7 +71,7 @@ class SintelLayout(FlowLayout):
     root = "Sintel/training"
 
     def write_view(self, view: DatasetView) -> Any:
-        """Write the picture of a view, its flow as .flo, and where that is hidden or unknown."""
+        """Write the picture of a view, its flow as .flo, and masks of hidden and of unknown flow."""
         camera, name = f"camera_{view.number // view.frames:02d}", f"frame_{view.frame + 1:04d}"
         for folder in ("clean", "final"):
             view.write_colors(str(self._path(folder, camera, f"{name}.png")))

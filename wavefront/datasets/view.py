@@ -1,4 +1,4 @@
-"""One view of a data set: what formats are told of it, and its camera's matrices."""
+"""One view of a data set, as formats get it, and its camera's matrices."""
 
 from __future__ import annotations
 

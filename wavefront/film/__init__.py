@@ -1,1 +1,1 @@
-"""What the samples of a picture add up to: sums, their errors, and the files that keep them."""
+"""The sums of the samples of a picture, their errors, and the files that keep them."""

@@ -1,4 +1,4 @@
-"""Sums of the sampled AOVs of a picture, and what they come to."""
+"""Sums of the sampled AOVs of a picture, and the estimates from them."""
 
 from __future__ import annotations
 

@@ -134,7 +134,7 @@ class Film(Sums):
         np.add.at(self.dropped, pixels, 1)
 
     def used(self, span: slice = slice(None)) -> Ints:
-        """Return how many samples of each pixel were not dropped, (k,)."""
+        """Return the number of samples of each pixel that were not dropped, (k,)."""
         return self.count[span] - self.dropped[span] if self.dropped.size else self.count[span]
 
     def _close_batch(self, lanes: Lanes, number: int) -> None:
@@ -154,7 +154,7 @@ class Film(Sums):
             self.batches[half][:, lanes] = pair[0] + pair[1]
 
     def restore(self, arrays: Mapping[str, NDArray[Any]], prefix: str = "") -> None:
-        """Take the sums from what `arrays` returned, under names that begin with `prefix`; without a copy."""
+        """Take the sums from the result of `arrays`, under names that begin with `prefix`, without a copy."""
         dropped = arrays.get(f"{prefix}dropped", NONE)
         self.dropped = np.zeros(self.count.size if dropped.size else 0, np.int32)
         super().restore(arrays, prefix)
@@ -239,7 +239,7 @@ class Film(Sums):
         return error
 
     def deviations(self, span: slice = slice(None)) -> Doubles:
-        """Return how batches deviate from the mean, (batches, 3, k), for pixels with two samples or more.
+        """Return the deviations of batches from the mean, (batches, 3, k); pixels have two samples at least.
 
         They are scaled so that their squares add up to `_scatter_of_batches`. Batches that a pixel does not
         have, and all of a pixel of which samples were dropped, are 0.

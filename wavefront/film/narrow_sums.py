@@ -1,4 +1,4 @@
-"""Sums of how much light narrow lobes could bring to sensors (aovs/narrow_lobes.py)."""
+"""Sums of the light that narrow lobes could bring to sensors (aovs/narrow_lobes.py)."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The sums that a picture is made of: what checkpoints keep, and what merging adds up."""
+"""The sums of a picture, which checkpoints keep and merging adds up."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Which samples a picture is made of, and whether two pictures share some."""
+"""The ranges of the samples of a picture, and those that two pictures share."""
 
 from __future__ import annotations
 

@@ -245,7 +245,7 @@ def _tested(
 
 
 def _shared(a: Image | ArrayLike, b: Image | ArrayLike) -> tuple[str, float]:
-    """Return which samples two pictures share, and by what variances are multiplied for that.
+    """Return a note on the samples that two pictures share, and the factor of variances for that.
 
     The variance of a difference is at most (σa + σb)² ≤ 2·(σa² + σb²), whatever the errors have in common.
     """
@@ -277,7 +277,7 @@ def _estimate(picture: Image | ArrayLike, mean: Doubles, factor: float) -> Estim
 
 
 def _batches(counts: Ints) -> Ints:
-    """Return how many batches the error of each pixel is estimated from, for its number of samples."""
+    """Return the number of batches behind the error of each pixel, by its number of samples."""
     distinct, which = np.unique(counts, return_inverse=True)
     return np.array([count // batch_size(count) for count in distinct.tolist()])[which].reshape(counts.shape)
 

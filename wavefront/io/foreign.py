@@ -1,4 +1,4 @@
-"""Meshes, points and lines of Open3D, read by their attributes, and what other such readers share."""
+"""Meshes, points and lines of Open3D, read by their attributes, and the functions that such readers share."""
 
 from __future__ import annotations
 

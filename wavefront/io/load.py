@@ -111,7 +111,7 @@ def load(
 
 
 def _read_at(path: PathLike, options: LoadOptions, time: float) -> Scene:
-    """Read a file again, at another time; what is lost of it has been said."""
+    """Read a file again, at another time; its losses have been reported before."""
     name = path_name(path)
     with collect_warnings(), Losses(name) as losses:
         return read(path, replace(options, losses=losses, time=time)).scene(name, losses)

@@ -1,4 +1,4 @@
-"""What of a file is damaged, unknown or not supported: one list for each load, and one warning.
+"""The damaged, unknown and unsupported parts of a file: one list for each load, and one warning.
 
 What is damaged or unknown in one part of a file costs that part, not the file. A reader leaves it
 out, or replaces it by what one named viewer of the format shows, and notes it: glTF as Khronos'
@@ -55,7 +55,7 @@ class Part:
 
 
 class Losses:
-    """Collects what is lost of a file; as a context manager it says all of it at the end.
+    """Collects the losses of a file; as a context manager it reports them at the end.
 
     Within the block, what `warn_caller` is given is noted, too, whoever calls it.
 
@@ -90,7 +90,7 @@ class Losses:
         self._noted[Loss(where, part, value, done)] = None
 
     def notice(self, part: str, place: str, done: str) -> None:
-        """Note what may surprise, but is shown as the file says: `strict` is no error of it.
+        """Note a surprise, which is shown as the file says; with `strict` it is no error.
 
         The arguments are those of `note`; several places with the same part count as one.
         """

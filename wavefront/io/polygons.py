@@ -151,9 +151,9 @@ def _areas(points: Doubles, triangles: Ints) -> tuple[Doubles, Doubles]:
 
 
 def _broken(points: Doubles, corners: Ints, counts: Ints, polygons: Ints) -> Triangles:
-    """Return triangles that stand for those of `polygons` that have a corner which float32 does not hold.
+    """Return a triangle for each of `polygons` that has a corner beyond float32.
 
-    They consist of that corner alone, and so are left out where meshes are built: as a whole.
+    All its corners are that corner, so that the whole polygon is left out where meshes are built.
     """
     sound: Bools = np.all(np.abs(points) <= FLOAT32_MAX, axis=1)  # false for NaN
     bad = np.flatnonzero(~sound[corners])

@@ -187,7 +187,7 @@ def mesh_reader(files: SceneFiles) -> Callable[[Path], list[RawMesh]]:
 
 
 def _from_scene(load: Callable[[str, bytes], Scene]) -> Reader:
-    """Return a reader that gives what `load`, a user's own function, makes of a file."""
+    """Return a reader that calls `load`, a user's own function."""
 
     def read_scene(files: SceneFiles, data: bytes, options: LoadOptions) -> Contents:
         name = files.name

@@ -66,7 +66,7 @@ class Rows:
         return np.stack(numbers, 1) if len(numbers) == len(columns) else None
 
     def units(self, names: Iterable[str]) -> Doubles | None:
-        """Return the same, where the largest whole number of a type stands for 1.
+        """Return columns as `table`, divided by the largest whole number of their type.
 
         Larger types than two bytes often have bytes in them.
         """
@@ -106,7 +106,7 @@ def rows_of_lines(element: Element, lines: list[list[str]]) -> Rows:
 
 
 def _as(values: NDArray[Any], kind: str) -> NDArray[Any]:
-    """Return values as numbers of a type; a signaling NaN is any NaN, and what is too large infinite."""
+    """Return values as numbers of a type: a signaling NaN as any NaN, and too large values as infinite."""
     with np.errstate(all="ignore"):
         return values.astype(kind)
 

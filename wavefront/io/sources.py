@@ -188,7 +188,7 @@ class SceneFiles:
     def named(
         self, reference: str, base: PathLike | None = None, folders: Sequence[Path] | None = None
     ) -> Path:
-        """Return the path of a file by its very name: what a library opens by this name must be found so.
+        """Return the path of a file by its exact name, by which a library opens it.
 
         It is that of the first place where the file exists, or else the first allowed one.
 
@@ -244,7 +244,7 @@ class SceneFiles:
         place: str = "",
         instead: StoredImage | None = None,
     ) -> StoredImage | None:
-        """Return an image; that it is missing or damaged costs no more than the image.
+        """Return an image, or `instead` if it is missing or damaged, which is noted.
 
         Parameters
         ----------
@@ -255,7 +255,7 @@ class SceneFiles:
         place
             Where the scene refers to it, for the note of the loss.
         instead
-            What is returned then.
+            Returned in its place; None for nothing.
 
         Raises
         ------

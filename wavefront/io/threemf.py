@@ -294,7 +294,7 @@ class _Model:
             return float(self._missing(attributes, name, np.nan))
 
     def _whole(self, attributes: dict[str, str], name: str, usual: int | None = None) -> int:
-        """Return a whole number of an element; one that none has, which is noted, where it is damaged."""
+        """Return a whole number of an element; -1, which is noted, where it has none."""
         if usual is not None and name not in attributes:
             return usual
         try:

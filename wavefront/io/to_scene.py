@@ -1,4 +1,4 @@
-"""What can be rendered, as a scene and the camera that sees it."""
+"""Scenes and cameras of all that can be rendered."""
 
 from __future__ import annotations
 
@@ -182,7 +182,7 @@ def coloring_of(values: Mapping[str, Any]) -> Coloring | None:
 
 
 def framed(subject: Any, view: Any, fov: float | None, size: Any, up: Any) -> Camera:
-    """Return the camera by which `render` would see what it is given; arguments as for `render`."""
+    """Return the camera that `render` would choose; arguments as for `render`."""
     size = None if size is None else image_size(size)
     fov = None if fov is None else field_of_view(fov)
     return choose_camera(as_scene(subject), None, size, up, view, fov)[0]

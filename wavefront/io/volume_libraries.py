@@ -144,7 +144,7 @@ def read_vti(path: str, data: bytes, budget: Budget, name: str | None = None) ->
 
 
 def read_vdb(path: str, data: bytes, budget: Budget, name: str | None = None) -> tuple[Floats, Doubles]:
-    """Return a grid of OpenVDB, in a box around the active voxels of all grids that lie as it does.
+    """Return a grid of OpenVDB, in a box around the active voxels of all grids with its transform.
 
     The box has a margin of one voxel, so that interpolation fades to the background there.
     """

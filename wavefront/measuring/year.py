@@ -1,4 +1,4 @@
-"""The light at points over many hours, and what planners ask of it."""
+"""The light at points over many hours, and the figures that planners need."""
 
 from __future__ import annotations
 

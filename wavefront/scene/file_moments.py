@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
 
 class FileMoments:
-    """What of a scene is that of its file, and how the file is read at other times.
+    """The elements of a scene that come from its file, and how the file is read at other times.
 
     Parameters
     ----------
@@ -40,7 +40,7 @@ class FileMoments:
         self._samples: list[Scene] = []
 
     def samples(self, scene: Scene) -> list[Scene]:
-        """Return the scene at a few times, which say how far it reaches, read once."""
+        """Return the scene at a few times, read once, from which its bounds follow."""
         if not self._samples:
             self._samples = [scene.at(time) for time in np.linspace(*self.span, FEW)]
         return self._samples

@@ -1,4 +1,4 @@
-"""What notebooks show for a scene: counts, bounds, and tables of its materials and lights."""
+"""The HTML of a scene in notebooks: counts, bounds, and tables of its materials and lights."""
 
 from __future__ import annotations
 
@@ -59,7 +59,7 @@ def _curved(shape: Shape) -> int:
 
 
 def _material_rows(shapes: Sequence[Shape]) -> list[list[Any]]:
-    """Return each material once: its name, what it is, and what is made of it."""
+    """Return a row for each material: its name, its BSDF, and the shapes that have it."""
     users: dict[int, list[Shape]] = {}
     for shape in shapes:
         users.setdefault(id(shape.material), []).append(shape)

@@ -79,7 +79,7 @@ class Preset:
         return image
 
     def backdrop(self) -> Doubles:
-        """Return the same without the boxes, which a camera does not see."""
+        """Return the image without the soft boxes, which a camera does not see."""
         directions = _directions()
         heights, levels = np.array(self.gradient).T
         place = np.clip(np.searchsorted(heights, directions[1]) - 1, 0, len(heights) - 2)

@@ -44,7 +44,7 @@ class Loss:
     done: str = ""
 
     def said(self, file: str) -> str:
-        """Return it as a line of a message about a file, whose name and folder are left out."""
+        """Return the line of a message about a file, without its name and folder."""
         folder = os.path.join(os.path.dirname(file), "")
         where = self.place.removeprefix(file).lstrip(":, ").removeprefix(folder)
         what = f"{self.part} is {self.value}" if self.value else self.part

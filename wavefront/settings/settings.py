@@ -1,4 +1,4 @@
-"""The settings of a render, checked, and what follows from them."""
+"""The settings of a render, checked, and the values that follow from them."""
 
 from __future__ import annotations
 

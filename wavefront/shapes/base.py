@@ -160,7 +160,7 @@ class Shape(Moving, Answers, ABC):
         return shape
 
     def _formed(self, time: float) -> Any:
-        """Return a still copy that has the form of a time, but for its motion."""
+        """Return a still copy that has the form of a time; its motion is not applied."""
         shape = copy(self)
         shape.motion = shape._rest = shape.deformation = None
         if self.deformation is not None:
@@ -168,7 +168,7 @@ class Shape(Moving, Answers, ABC):
         return shape
 
     def _keep_given(self, other: Shape) -> None:
-        """Have what a user may have changed of another shape, which is the same one at another time."""
+        """Copy the attributes that a user may have changed from the same shape of another time."""
         vars(self).update({name: value for name, value in vars(other).items() if name in self._given})
 
     def translated(self, offset: ArrayLike) -> Self:

@@ -1,4 +1,4 @@
-"""What varies over a surface: the contract, images, vertex colors, normal and bump maps, parameters."""
+"""Parameters that vary over surfaces: their interface, images, vertex colors, normal and bump maps."""
 
 from .base import BaseTexture
 from .image import Texture

@@ -1,4 +1,4 @@
-"""What a browser sees first: the page of viser, with a picture that is there before its scripts run."""
+"""The first page of a browser: that of viser, with a picture that is there before its scripts run."""
 
 from __future__ import annotations
 

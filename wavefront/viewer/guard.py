@@ -1,4 +1,4 @@
-"""What a viewer answers: requests with its token, under its own address, and messages that it knows."""
+"""The requests that a viewer answers: with its token, to its own address, and messages that it knows."""
 
 from __future__ import annotations
 

@@ -233,7 +233,7 @@ class Page:
             self._in_background(watch.play if event.target.value else watch.pause)
 
     def _in_background(self, act: Callable[[], object]) -> None:
-        """Do what takes longer than the event loop may wait, in the order in which it was asked for."""
+        """Run a function that takes longer than the event loop may wait, in the order of the calls."""
         self._acts.submit(self._tried, act)
 
     def _tried(self, act: Callable[[], object]) -> None:
@@ -387,7 +387,7 @@ class Page:
         return " · denoising" if is_quick() else " · denoising, slowly: pip install pyoidn makes it quick"
 
     def _urgent(self) -> bool:
-        """Return whether what is to be shown may not wait: all but a better picture of the same view."""
+        """Return whether a picture may not wait: any but a better one of the same view."""
         last, frame = self._sent[0], self._frame
         better = last is not None and frame is not None and frame is not last and frame.camera is last.camera
         return self._closed or not better or (frame is not None and frame.final)

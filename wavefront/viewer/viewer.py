@@ -286,7 +286,7 @@ class Viewer:
         return self._error is not None or (self._latest is not None and self._latest.camera is self._wanted)
 
     def _watch(self) -> None:
-        """Update the picture when the scene has changed, and has not since."""
+        """Update the picture once the scene has changed, and then stayed as it is for a moment."""
         assert self._state is not None
         before = self._shown_state
         while not self._closed.wait(WATCH):
@@ -474,7 +474,7 @@ def _no_path(view: Viewpoint, pixel: tuple[int, int]) -> PathVertices:
 
 
 def _executor(workers: int | None, paths: int) -> str | None:
-    """Choose an executor before there are other threads, so that it need not be chosen anew for each view.
+    """Choose an executor once, before there are other threads.
 
     None leaves the choice to the session, where it depends on whether the scene can be pickled.
     """

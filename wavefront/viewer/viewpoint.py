@@ -58,7 +58,7 @@ class Surroundings:
         return self.rounded(at * self.radius + self.center)
 
     def rounded(self, values: Any) -> Triple:
-        """Return three numbers with few digits, for coordinates that people read."""
+        """Return three numbers with few digits, as coordinates for people."""
         return _rounded(values, self.digits)
 
     @property
@@ -120,7 +120,7 @@ class Viewpoint:
         )
 
     def moved(self, origin: Any, target: Any, up: Any) -> Viewpoint:
-        """Return this one with the camera of the page elsewhere; all (3,) of the page.
+        """Return the viewpoint with the camera at another place; arguments (3,) in units of the page.
 
         Raises
         ------
@@ -139,7 +139,7 @@ class Viewpoint:
         )
 
     def resized(self, width: Any, height: Any) -> Viewpoint:
-        """Return this one for a page of a size in pixels: its shape, and not more pixels than allowed.
+        """Return the viewpoint for a page of a size in pixels: of its aspect, at most the pixels allowed.
 
         Raises
         ------
@@ -151,7 +151,7 @@ class Viewpoint:
         return self._checked(size=(max(1, round(sides[0] * scale)), max(1, round(sides[1] * scale))))
 
     def with_lens(self, **values: Any) -> Viewpoint:
-        """Return this one with another `fov`, `aperture` or `focus`, in the ranges of the page.
+        """Return the viewpoint with another `fov`, `aperture` or `focus`, in the ranges of the page.
 
         Raises
         ------
@@ -165,7 +165,7 @@ class Viewpoint:
 
     @property
     def ranges(self) -> dict[str, tuple[float, float]]:
-        """Least and greatest value of each part of the lens; what the camera has is within them."""
+        """Least and greatest value of each parameter of the lens; the camera's own are within them."""
         radius = self.surroundings.radius
         return {
             "fov": FOV,
@@ -210,7 +210,7 @@ class Viewpoint:
         )
 
     def _checked(self, **values: Any) -> Viewpoint:
-        """Return this one with other values, if they make a camera."""
+        """Return the viewpoint with other values, if these are valid for a camera."""
         other = replace(self, **values)
         other.camera  # noqa: B018
         return other

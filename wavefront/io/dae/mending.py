@@ -44,7 +44,7 @@ def _is_malformed(text: bytes) -> bool:
 
 
 def mended(data: bytes) -> bytes | None:
-    """Return a document that says so where a number is damaged, or an index too large; None without these."""
+    """Return a document with marks in place of damaged numbers and too large indices; None if it has none."""
     root = ElementTree.fromstring(data)
     changed = [_mend_numbers(numbers) for numbers in root.iterfind(".//{*}float_array")]
     for mesh in root.iterfind(".//{*}mesh"):

@@ -1,1 +1,1 @@
-"""What a file says of a scene, in the terms of this package: importers fill it, whatever their format."""
+"""The description of a scene, which importers of all formats fill, in the terms of this package."""

@@ -1,4 +1,4 @@
-"""What a file or an object of another library holds: the one thing that every importer fills."""
+"""The content of a file, or of an object of another library: every importer fills it."""
 
 from __future__ import annotations
 

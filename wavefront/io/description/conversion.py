@@ -47,7 +47,7 @@ class PlacedError(SceneError):
 
 @contextmanager
 def placed(place: str, name: str = "") -> Iterator[None]:
-    """Give errors a place, unless they have one; `name`, or the file, at their beginning is left out."""
+    """Give errors a place, unless they have one; the name or file that they begin with is left out."""
     try:
         yield
     except PlacedError:
@@ -137,7 +137,7 @@ class Conversion:
         return self.made[key]
 
     def changed(self, material: Material, **parts: Any) -> Material:
-        """Return a material with other parts, the same for the same ones."""
+        """Return a material with other parts; the same object for the same parts."""
 
         def make() -> tuple[Material, Any]:
             other = copy(material)
@@ -169,12 +169,12 @@ class Conversion:
         return read_spectrum(path, self.files.read(path))
 
     def count(self, faces: Any) -> None:
-        """Refuse triangles that are too many with those before."""
+        """Count triangles, and refuse them if there are too many in all."""
         self.triangles += len(faces)
         self.files.limits.check_triangles(self.name, self.triangles)
 
     def count_instances(self, count: int) -> None:
-        """Refuse instances that are too many with those before."""
+        """Count instances, and refuse them if there are too many in all."""
         self.instances += count
         most = self.files.limits.instances
         if self.instances > most:

@@ -33,7 +33,7 @@ BELOW_180 = Limit(lambda x: 0 < x < 180, "above 0 and below 180 degrees")
 
 
 class Maker(NamedTuple):
-    """How entities of a type are converted, and which of their parameters count."""
+    """How entities of a type are converted, and which of their parameters are read."""
 
     kind: str  # "shape", "bsdf", ...
     convert: Callable[[Any], Any] | None  # None: the type is not supported
@@ -125,7 +125,7 @@ class Entity:
         self.retype(self.type)
 
     def retype(self, type: str) -> None:
-        """Make it one of another type."""
+        """Give it another type."""
         self.type = type
         self.maker = self.job.table.makers.get((self.kind, type))
 
@@ -134,12 +134,12 @@ class Entity:
 
     @property
     def label(self) -> str:
-        """Where it is, and what, for messages."""
+        """Its place and title, for messages."""
         return f"{self.place}: {self.title}" if self.title else self.place
 
     @property
     def lost(self) -> Losses:
-        """What is lost of the load."""
+        """The losses of the load."""
         losses: Losses = self.job.files.losses
         return losses
 
@@ -148,14 +148,14 @@ class Entity:
         self.lost.note(f"{self.title}: {what}" if self.title else what, self.place)
 
     def report(self) -> None:
-        """Note the parameters that have not counted."""
+        """Note the parameters that had no effect."""
         for name in [unread for unread in self.values if unread in self.unread] if self.unread else ():
             value = self.values[name]
             self.lose(f"{value.kind} {name!r}" if isinstance(value, Entity) else name)
         self.unread.clear()
 
     def check(self) -> None:
-        """Note the parameters that do not count by the table, where it says which do."""
+        """Note the parameters that the table does not read, if it lists those that it does."""
         maker = self.maker
         if maker is None:
             return

@@ -1,4 +1,4 @@
-"""Tables of the parameters of materials: what a format calls each, and what it is here."""
+"""Tables of the parameters of materials: the name of each in a format, and its name here."""
 
 from __future__ import annotations
 
@@ -43,7 +43,7 @@ def fill(
     factor: Callable[[Parameter], Any],
     image: Callable[[Parameter, Any], BaseTexture | None],
 ) -> None:
-    """Set the parameters of a table that a file gives and that change something.
+    """Set the parameters of a table that a file has, unless they have no effect.
 
     Parameters
     ----------

@@ -46,7 +46,7 @@ class Places:
 
 
 def meters(losses: Losses, name: str, unit: Any, usual: float) -> float:
-    """Return the unit of a file in meters, `usual` where it says none, or none that can be."""
+    """Return the unit of a file in meters; `usual` where it has none, or one that is not valid."""
     if unit is None:
         return usual
     value = float(unit)

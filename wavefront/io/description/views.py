@@ -29,12 +29,12 @@ def half_tangent(degrees: float) -> float:
 
 
 def angle_of(tangent: float) -> float:
-    """Return the angle the tangent of whose half is given."""
+    """Return the angle whose half has this tangent."""
     return float(2 * np.degrees(arctan2(np.float64(tangent), np.float64(1))))
 
 
 def looking(name: str, origin: np.ndarray, target: np.ndarray, up: np.ndarray) -> Matrix:
-    """Return the matrix of a thing at `origin` whose z axis points at `target`, and whose y axis is up."""
+    """Return the matrix of an object at `origin` whose z axis points at `target`, and whose y axis is up."""
     ahead = target - origin
     size = np.linalg.norm(ahead)
     if not size > 0:

@@ -56,7 +56,7 @@ class Job(Conversion):
 
 
 class Graph:
-    """Builds nodes from a dictionary: those that are referred to several times once.
+    """Builds nodes from a dictionary: one for each plugin, however many references it has.
 
     Parameters
     ----------

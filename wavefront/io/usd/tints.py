@@ -15,7 +15,7 @@ DISPLAYED = {"displayColor": 3, "displayOpacity": 1}  # primvars that are read w
 
 
 def outside(prim: Any, name: str, time: Any) -> tuple[float, ...] | None:
-    """Return the value of a primvar that an instance gets from above its prototype, None for no such one."""
+    """Return the value of a primvar that an instance inherits from above its prototype; None without one."""
     from pxr import UsdGeom
 
     if not prim.IsInstanceProxy():

@@ -1,4 +1,4 @@
-"""The keywords of MTL: what stands after each, which values it may have, and which have no effect."""
+"""The keywords of MTL: the kind and the range of their values, and the values without an effect."""
 
 from __future__ import annotations
 
@@ -94,7 +94,7 @@ def options_read(key: str) -> frozenset[str]:
 
 
 def mended(key: str, rest: str) -> tuple[str | None, str]:
-    """Return the numbers of a line as text, None if it is left out, and what is noted of it, if anything.
+    """Return the numbers of a line as text, None if it is left out, and a note, "" if there is none.
 
     Parameters
     ----------
