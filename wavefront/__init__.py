@@ -376,15 +376,15 @@ __all__ = [
 
 def __getattr__(name: str) -> Any:
     if name in _MODULES:
-        found = import_module(_MODULES[name], __name__)
+        attribute = import_module(_MODULES[name], __name__)
     elif name in _HOME_OF:
-        found = getattr(import_module(_HOME_OF[name], __name__), name)
+        attribute = getattr(import_module(_HOME_OF[name], __name__), name)
     else:
         hint = did_you_mean(name, __all__, (__name__,)) if not name.startswith("_") else ""
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}{hint}")
     import_module(".io.to_scene", __name__)  # registers what is taken of other libraries
-    globals()[name] = found  # from now on without this function
-    return found
+    globals()[name] = attribute  # from now on without this function
+    return attribute
 
 
 def __dir__() -> list[str]:

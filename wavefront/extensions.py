@@ -241,13 +241,13 @@ def register_format(
         raise SceneError(f"extension is {extension!r}; it must begin with a dot, as '.xyz' does")
     from .io.readers import READERS  # here, as few programs read scenes of their own formats
 
-    given: list[tuple[Registry[Any], Any]] = [
+    functions: list[tuple[Registry[Any], Any]] = [
         (READERS, load),
         (IMAGE_READERS, read_image),
         (IMAGE_WRITERS, write_image),
     ]
-    if all(function is None for _, function in given):
+    if all(function is None for _, function in functions):
         raise SceneError("register_format needs load, read_image or write_image")
-    for table, function in given:
+    for table, function in functions:
         if function is not None:
             table.register(extension.lower(), function)
