@@ -35,15 +35,15 @@ def setup_errors() -> Iterator[None]:
 
 
 def interrupted(image: Image, spp: int | None, go_on: str = "") -> Interrupted:
-    """Return the error that says how much of `spp` samples per pixel there is; None if that is open.
+    """Return the error that tells the samples per pixel so far, of `spp` (None: of an open number).
 
     `go_on` says how the render goes on, if it does.
     """
     if not image.metadata["samples"]:
         return Interrupted("interrupted: there is no picture yet")
-    found = image.metadata["spp"]
-    there = f"{found:.4g} of " + plural(spp, "sample") if spp else plural(found, "sample", form=".4g")
-    return Interrupted(f"interrupted: the picture so far has {there} per pixel{go_on}", image)
+    samples = image.metadata["spp"]
+    progress = f"{samples:.4g} of " + plural(spp, "sample") if spp else plural(samples, "sample", form=".4g")
+    return Interrupted(f"interrupted: the picture so far has {progress} per pixel{go_on}", image)
 
 
 def render_error(failure: Exception, image: Image) -> RenderError:
@@ -64,14 +64,14 @@ def warn_of_long_paths(max_bounces: int) -> None:
 
 
 def check_last_image(image: Image, picture: Picture, time_up: bool, surfaces: int) -> None:
-    """Warn of what is wrong with the last picture.
+    """Warn of defects of the last picture.
 
     Parameters
     ----------
     image
         The picture.
     picture
-        What it was made from.
+        The picture while it was rendered.
     time_up
         Whether the render was ended before its time.
     surfaces
@@ -86,11 +86,11 @@ def check_last_image(image: Image, picture: Picture, time_up: bool, surfaces: in
     if time_up:
         _check_first_samples(image, values["seconds"], surfaces)
     picture.bad.report(image, lambda pixel, sample: _cause_of_bad_sample(picture, pixel, sample))
-    found = image.metadata
-    if values["clamp"] is not None and found["clamped"] > MUCH_LIGHT:
+    metadata = image.metadata
+    if values["clamp"] is not None and metadata["clamped"] > MUCH_LIGHT:
         warn_caller(
-            f"clamp={values['clamp']:g} removed {100 * found['clamped']:.1f} % of the light, so the picture "
-            'is too dark: raise it; the AOV "clamped" shows where'
+            f"clamp={values['clamp']:g} removed {100 * metadata['clamped']:.1f} % of the light, so the "
+            'picture is too dark: raise it; the AOV "clamped" shows where'
         )
     in_picture = picture.camera.sensor is None
     if in_picture and values["background"] is None and _is_black_or_white(image):
@@ -102,11 +102,11 @@ def check_last_image(image: Image, picture: Picture, time_up: bool, surfaces: in
         )
     ended = time_up or picture.film.count.max() == settings.max_spp
     asked = values["noise"] is not None and not settings.by_itself
-    if asked and ended and not found["noise"] <= values["noise"]:
-        noise = "unknown" if np.isnan(found["noise"]) else f"{found['noise']:.4g}"
+    if asked and ended and not metadata["noise"] <= values["noise"]:
+        noise = "unknown" if np.isnan(metadata["noise"]) else f"{metadata['noise']:.4g}"
         warn_caller(
             f"noise={values['noise']:.4g} was not reached: it is {noise} after "
-            f"{plural(found['spp'], 'sample', form='.4g')} per pixel in {found['seconds']:.3g} s"
+            f"{plural(metadata['spp'], 'sample', form='.4g')} per pixel in {metadata['seconds']:.3g} s"
         )
 
 

@@ -31,7 +31,7 @@ FPS = 24.0  # where none is given
 MOST_FRAMES = 1_000_000
 OF_BARE = ("material", "smooth", *COLORING)  # settings that are applied before there are moments
 
-SceneAt: TypeAlias = Callable[[float], Any]  # what is rendered at a time
+SceneAt: TypeAlias = Callable[[float], Any]  # the scene of a time
 
 
 @takes_settings
@@ -64,7 +64,7 @@ def render_frames(  # type: ignore[misc]  # its shutter is a part of a frame
     fps
         Frames per second, 24 by default.
     shutter
-        Part of the time of a frame for which the shutter is open, around its time: with 0.5 what moves from a
+        Part of the time of a frame for which the shutter is open, around its time: with 0.5 motion from a
         quarter of a frame before to a quarter after is blurred. None: each frame is one moment.
     animation
         Of a file: the name or number of one of its animations, as for `load`.
@@ -96,22 +96,23 @@ def render_frames(  # type: ignore[misc]  # its shutter is a part of a frame
     >>> [image.shape for image in wf.render_frames(scene, spp=1, fps=4, size=(16, 16))]
     [(16, 16, 3), (16, 16, 3)]
     """
-    given: dict[str, Any] = {**settings}
+    options: dict[str, Any] = {**settings}
     rate = FPS if fps is None else number("fps", fps, lambda x: x > 0, "above 0")
     open_for = None
     if shutter is not None:
         open_for = number("shutter", shutter, lambda x: x > 0, "above 0") / rate
-    scene_at, span = _source(source, animation, given, open_for is not None)
+    scene_at, span = _source(source, animation, options, open_for is not None)
     moments = frame_times(times, rate, span)
-    own = _with_flow_times(given, moments)
+    options_of_frames = _with_flow_times(options, moments)
     jobs = [
-        (each, _settings_of_frame(own[at], at, each, open_for)) for at, each in enumerate(moments.tolist())
+        (time, _settings_of_frame(options_of_frames[at], at, time, open_for))
+        for at, time in enumerate(moments.tolist())
     ]
     Settings(spp=spp, **jobs[0][1])  # checks them
-    frames = _by_jobs if _takes_frames(given.get("executor")) else _one_by_one
+    frames = _by_jobs if _takes_frames(options.get("executor")) else _one_by_one
     begin = clock.perf_counter()
-    with Bar(given.get("progress"), len(jobs), None, unit="frame") as bar:
-        for image in frames(scene_at, jobs, spp, given):
+    with Bar(options.get("progress"), len(jobs), None, unit="frame") as bar:
+        for image in frames(scene_at, jobs, spp, options):
             bar.advance(1, clock.perf_counter() - begin)
             yield image
 
@@ -126,10 +127,10 @@ def frame_times(times: Any, fps: float, span: tuple[float, float] | None) -> Dou
     """
     rate = number("fps", fps, lambda x: x > 0, "above 0")
     if times is not None:
-        found = finite_array("times", _as_list(times), (None,))
-        if not len(found):
+        moments = finite_array("times", _as_list(times), (None,))
+        if not len(moments):
             raise SceneError("times is empty; render_frames needs at least one")
-        return found
+        return moments
     if span is None:
         raise SceneError("source is a function of time; give its times")
     count = max(1, round((span[1] - span[0]) * rate))
@@ -139,14 +140,14 @@ def frame_times(times: Any, fps: float, span: tuple[float, float] | None) -> Dou
 
 
 def _as_list(times: Any) -> ArrayLike:
-    """Return times as what an array is made of; those of an iterator as a list."""
+    """Return times for an array; those of an iterator as a list."""
     return list(times) if isinstance(times, Iterator) else times
 
 
 def _source(
-    source: Any, animation: str | int | bool | None, given: dict[str, Any], blurred: bool
+    source: Any, animation: str | int | bool | None, options: dict[str, Any], blurred: bool
 ) -> tuple[SceneAt, tuple[float, float] | None]:
-    """Return what gives the scene of a time, and from when to when it moves; None where a function gives it.
+    """Return a function from a time to the scene, and the span in which it moves; None for a user's function.
 
     Settings of bare meshes are taken out of those given. Where the frames are blurred the scene is the same
     for all times, and moves.
@@ -155,13 +156,13 @@ def _source(
         if animation is not None:
             raise SceneError("animation is for files; source is a function of time")
         return source, None
-    bare = {name: given.pop(name) for name in OF_BARE if name in given}
+    bare = {name: options.pop(name) for name in OF_BARE if name in options}
     reading = {} if animation is None else {"animation": animation}
     values = Settings(**bare).values
     scene = as_scene(
         source,
         values["material"],
-        given.get("progress"),
+        options.get("progress"),
         values["smooth"],
         reading=reading,
         coloring=coloring_of(values),
@@ -174,34 +175,37 @@ def _same(scene: Scene, time: float) -> Scene:
     return scene
 
 
-def _settings_of_frame(given: dict[str, Any], at: int, time: float, open_for: float | None) -> dict[str, Any]:
+def _settings_of_frame(
+    options: dict[str, Any], at: int, time: float, open_for: float | None
+) -> dict[str, Any]:
     """Return the settings of a frame by its number and its time: it has its own checkpoint, and no bar.
 
     Where the shutter is open for some time, seconds, a camera that is given moves meanwhile.
     """
-    own = {**given, "progress": False}
+    frame = {**options, "progress": False}
     if open_for is not None:
-        own["shutter"] = time - open_for / 2, time + open_for / 2
-    if given.get("checkpoint") is not None:
-        own["checkpoint"] = numbered(path_name(given["checkpoint"]), at)
-    if given.get("camera") is not None and open_for is None:
-        own["camera"] = given["camera"].at(time)
-    return own
+        frame["shutter"] = time - open_for / 2, time + open_for / 2
+    if options.get("checkpoint") is not None:
+        frame["checkpoint"] = numbered(path_name(options["checkpoint"]), at)
+    if options.get("camera") is not None and open_for is None:
+        frame["camera"] = options["camera"].at(time)
+    return frame
 
 
-def _with_flow_times(given: dict[str, Any], moments: Doubles) -> list[dict[str, Any]]:
+def _with_flow_times(options: dict[str, Any], moments: Doubles) -> list[dict[str, Any]]:
     """Return the settings of frames, those of optical flow with the times of the frames before and after.
 
     Before the first frame and after the last one, the time goes on as between it and the next one.
     """
-    if given.get("flow_times") is not None or not flow_names(chosen_aovs("aovs", given.get("aovs", ()))):
-        return [given] * len(moments)
+    if options.get("flow_times") is not None or not flow_names(chosen_aovs("aovs", options.get("aovs", ()))):
+        return [options] * len(moments)
     if len(moments) < 2:
         raise SceneError("flow of one frame needs flow_times=(before, after), the times of other frames")
     ends = 2 * moments[0] - moments[1], 2 * moments[-1] - moments[-2]
     around = np.concatenate([ends[:1], moments, ends[1:]])
     return [
-        {**given, "flow_times": pair} for pair in zip(around[:-2].tolist(), around[2:].tolist(), strict=True)
+        {**options, "flow_times": pair}
+        for pair in zip(around[:-2].tolist(), around[2:].tolist(), strict=True)
     ]
 
 
@@ -214,7 +218,7 @@ def _takes_frames(executor: Any) -> bool:
 
 
 def _one_by_one(
-    scene_at: SceneAt, jobs: list[tuple[float, dict[str, Any]]], spp: int | None, given: dict[str, Any]
+    scene_at: SceneAt, jobs: list[tuple[float, dict[str, Any]]], spp: int | None, options: dict[str, Any]
 ) -> Iterator[Image]:
     """Render frames one after the other; a session goes on where only the camera has moved."""
     before: Scene | None = None
@@ -239,7 +243,7 @@ def _one_by_one(
 
 
 def _scene_at(scene_at: SceneAt, time: float, settings: dict[str, Any]) -> Scene:
-    """Return the scene of a time; what a function returns is made one, by settings of bare meshes."""
+    """Return the scene of a time; the result of a function is made one, by settings of bare meshes."""
     subject = scene_at(time)
     bare = {name: settings.pop(name) for name in OF_BARE if name in settings}
     if isinstance(subject, Scene) and not bare:
@@ -264,17 +268,17 @@ def _goes_on(
 
 
 def _by_jobs(
-    scene_at: SceneAt, jobs: list[tuple[float, dict[str, Any]]], spp: int | None, given: dict[str, Any]
+    scene_at: SceneAt, jobs: list[tuple[float, dict[str, Any]]], spp: int | None, options: dict[str, Any]
 ) -> Iterator[Image]:
-    """Have the workers of an executor render a frame each; what gives the scenes is sent to them once."""
-    executor = given["executor"]
+    """Have the workers of an executor render a frame each; the function of scenes is sent to them once."""
+    executor = options["executor"]
     EXECUTORS.find(executor)
-    count = worker_count(given.get("workers"), executor)
-    own = {"executor": "threads", "workers": 1}
+    count = worker_count(options.get("workers"), executor)
+    serial = {"executor": "threads", "workers": 1}
     with WorkerPool(
-        partial(_frame, scene_at, spp), count, executor, strict=bool(given.get("strict"))
+        partial(_frame, scene_at, spp), count, executor, strict=bool(options.get("strict"))
     ) as pool:
-        frames = [(time, {**settings, **own}) for time, settings in jobs]
+        frames = [(time, {**settings, **serial}) for time, settings in jobs]
         for _, image in pool.run(frames):
             yield image
 

@@ -21,7 +21,7 @@ from .prepared_scene import PreparedScene
 
 LONG = 10.0  # seconds of a render, from which on hints are shown
 LITTLE_FILLED = 0.15  # of a picture, by its subject
-NOTICED = 2.0  # likewise, what was done without being asked
+NOTICED = 2.0  # likewise, for choices that were made by themselves
 # Solid angle of a lamp at a specular surface, sr; from about 0.015 on, light tracing saves a third at most
 SMALL = 0.01
 MUCH = 0.1  # part of the light at a specular surface
@@ -58,7 +58,7 @@ NO_DENOISER = (
 
 
 def caustics_hint(settings: Settings, prepared: PreparedScene) -> str | None:
-    """Return what paths from lights would bring; None if that is little, or if they are traced."""
+    """Return the hint of caustics by paths from lights; None if they matter little, or are traced."""
     if settings.values["caustics"] or not settings.is_full or settings.values["max_bounces"] < 2:
         return None
     compiled = prepared.compiled
@@ -119,13 +119,13 @@ class Hints:
         self._told: set[str] = set()
 
     def tell(self, image: Image) -> None:
-        """Write what was done and what may help to stderr, a line each, if the last picture took long."""
+        """Write choices and hints to stderr, a line each, if the last picture took long."""
         seconds = image.metadata["seconds"]
-        found = [
+        hints = [
             *(self._ending(image) if seconds >= NOTICED else ()),
             *(self._of(image) if seconds >= LONG else ()),
         ]
-        lines = [hint for hint in found if hint not in self._told]
+        lines = [hint for hint in hints if hint not in self._told]
         self._told.update(lines)
         with suppress(OSError, ValueError, AttributeError):  # without a stderr there is none to see it
             for line in lines:

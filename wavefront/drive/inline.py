@@ -73,7 +73,7 @@ class InlineWorker:
 
 
 class _WatchedMonitor(WaveMonitor):
-    """A monitor that also lets the caller do between two bounces what it does while others trace."""
+    """A monitor that also gives the caller a turn between two bounces, as while other workers trace."""
 
     def __init__(self, monitor: WaveMonitor, waiting: Callable[[], object]) -> None:
         self.stop, self.surfaces = monitor.stop, monitor.surfaces

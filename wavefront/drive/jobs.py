@@ -33,11 +33,11 @@ SMALL_WAVE = 1 << 16  # lanes; in smaller waves a path costs more
 LARGE_WAVE = 1 << 17  # lanes; in larger waves it costs hardly less
 LANES_AT_ONCE = 1 << 19  # lanes of all workers together where that is a wave for each: 400 MB
 SMALLEST_WAVE = 64  # paths; without memory for as few there is an error
-SHARE = 1 / 4  # part of what is left for each worker that a job may be
+SHARE = 1 / 4  # largest job, as a part of the rest for each worker
 MAX_JOB_SECONDS = 1.0  # seconds that a large job may take, for progress waits for it
 GRACE = 1.1  # times the seconds that were given: when waves under way are discarded
 SHORT, LONG = 1 / 60, 1 / 20  # parts of the time there is that a wave should take
-SMOOTHING = 0.3  # weight of the latest wave in what a path is expected to cost
+SMOOTHING = 0.3  # weight of the latest wave in the expected cost of a path
 SQUARE = 8  # pixels on each side of a square whose pixels get the same number of samples
 
 
@@ -58,7 +58,7 @@ def passes(
     begun: Pass | None = None,
     everywhere: bool = False,
 ) -> Iterator[Pass]:
-    """Yield what is to be done, one pass after the other; each decides by what is on the film then.
+    """Yield the passes of a render, one after the other; each decides by the film at that time.
 
     Without `noise` there is one pass. With it there are more while the estimated error of the
     picture is above `noise`, at 32, 48, 64, 96, 128 ... samples, for those squares of pixels
@@ -74,8 +74,8 @@ def passes(
     Where light is traced from the lights, too, all pixels get equally many samples: each of them brings a
     path that may reach any pixel.
 
-    Where more than `MUCH_RARE` of the squared error rests on few samples, most pixels have not met what makes
-    the error, and the estimate is too small. The render goes on then until the estimate is as much smaller.
+    Where more than `MUCH_RARE` of the squared error rests on few samples, most pixels have not met its
+    cause, and the estimate is too small. The render goes on then until the estimate is as much smaller.
 
     Parameters
     ----------
@@ -137,12 +137,12 @@ def passes_until_clean(film: Film, spp: int, limit: float, begun: Pass | None = 
 
 
 def _trust(rare: float | None) -> float:
-    """Return by what squared errors that are asked for are multiplied, given the part that is rare."""
+    """Return the factor of squared errors to reach, given the part that is rare."""
     return 1 - min(rare, MOST_RARE) if rare is not None and rare > MUCH_RARE else 1.0
 
 
 def unfinished(film: Film, step: Pass) -> Iterator[Pass]:
-    """Yield what is left of a pass: a pass for each number of samples that its pixels have."""
+    """Yield the rest of a pass: a pass for each number of samples that its pixels have."""
     count = film.count[step.pixels]
     for done in distinct(count[count < step.last]):
         yield Pass(step.pixels[count == done], done, step.last)
@@ -168,7 +168,7 @@ class CameraJob:
     first_sample: int = 0  # index of the first sample of every pixel
     branches: int = 1  # ways in which a path goes on from its first surface
     reuse: bool = False  # pixels share paths, so those of a tile (sampling/tiles.py) belong in one job
-    guided: bool = False  # by what the tracer has for it
+    guided: bool = False  # by the table of the tracer
 
     @property
     def tiles(self) -> Tiles | None:
@@ -207,7 +207,7 @@ class CameraJob:
 
     def __reduce__(self) -> tuple[Any, ...]:
         """Pickle the time that is left as well: the clocks of two machines differ."""
-        values = [getattr(self, each.name) for each in fields(self)]
+        values = [getattr(self, field.name) for field in fields(self)]
         return _received, (values, self.deadline - time.perf_counter(), platform.node())
 
 
@@ -244,7 +244,7 @@ class Job:
         return self.lanes if self.wave_size is None else min(self.lanes, self.wave_size)
 
     def waves(self) -> Iterator[Job]:
-        """Yield what is traced at once, a job for each wave; the samples of every pixel come in order."""
+        """Yield the waves of the job, as jobs; the samples of every pixel come in order."""
         if self.lanes_at_once == self.lanes:
             yield self
             return
@@ -262,7 +262,7 @@ class Job:
 
     def __str__(self) -> str:
         """Name the block in an error message."""
-        first, last = (self.view.first_sample + each for each in (self.first_sample, self.end - 1))
+        first, last = (self.view.first_sample + sample for sample in (self.first_sample, self.end - 1))
         return f"samples {first} to {last} of {plural(self.pixels.size, 'pixel')} from {self.pixels[0]} on"
 
 
@@ -301,8 +301,8 @@ def split_jobs(
         parts = -(-pixels.size * depth // lanes)
         width = -(-pixels.size // parts)  # equal parts: a small wave costs almost as much as a large one
         depth = min(max(1, lanes // width), last - first)
-        for part in view.parts(pixels, width):
-            yield Job(view, part, first, depth, wave_size)
+        for chunk in view.parts(pixels, width):
+            yield Job(view, chunk, first, depth, wave_size)
         first += depth
 
 
@@ -321,7 +321,7 @@ class Scheduler:
     seconds
         Time that it may take; None for any.
     wave_size
-        Lanes of the largest wave; None for what suits the number of workers.
+        Lanes of the largest wave; None for a size that suits the number of workers.
     workers
         Waves that are traced at once.
     branches

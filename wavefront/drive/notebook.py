@@ -98,7 +98,7 @@ class LivePicture:
 
         _shell().events.unregister("post_run_cell", self._cell_ended)
         shown = result.result, getattr(result.error_in_exec, "image", None)
-        if any(each is self._last for each in shown):
+        if any(image is self._last for image in shown):
             self._handle.update(HTML(""))
 
 

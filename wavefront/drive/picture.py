@@ -158,7 +158,7 @@ class Picture:
         self.rays += result.rays
 
     def _add_splats(self, sums: LightSums, wave: Job, splats: Splats) -> None:
-        """Add what the paths from lights of a wave bring, sample by sample."""
+        """Add the light of paths from lights of a wave, sample by sample."""
         first, number = wave.view.first_sample + wave.first_sample, splats.path // wave.pixels.size
         for sample in range(wave.samples):
             some = splats.take(np.flatnonzero(number == sample))
@@ -244,7 +244,7 @@ class Picture:
         }
 
     def _brightest(self) -> dict[str, list[float]]:
-        """Return what the brightest emitter sends, (3,) each; zeros where sensors need no such record."""
+        """Return the light of the brightest emitter, (3,) each; zeros where sensors need no such record."""
         compiled, recorded = self.plan.scene.compiled, NARROW in self.plan.tracer.layers
         most = brightest_emitter(compiled) if recorded else np.zeros(3)
         efficacies = compiled.light_efficacies.names or (EFFICACY,)
@@ -266,12 +266,12 @@ class Picture:
             if monitor is not None:
                 stoppable = MonitoredAccelerator(compiled.accelerator, monitor, math.inf)
                 compiled = replace(compiled, accelerator=stoppable)
-            given = compiled, self.camera, self.plan.scene.shapes
+            view = compiled, self.camera, self.plan.scene.shapes
             if BOXES in aovs:
-                self._boxes = object_boxes(*given)
+                self._boxes = object_boxes(*view)
             names = geometric_names(aovs)
             flow = self.plan.scene.flow(self.camera, self.plan.settings) if flow_names(aovs) else None
-            self._geometric = geometric_aovs(*given, names, flow) if names else {}
+            self._geometric = geometric_aovs(*view, names, flow) if names else {}
         return self._geometric
 
     def _add_aovs(self, image: Image, geometric: dict[str, NDArray[Any]]) -> None:
@@ -286,7 +286,7 @@ class Picture:
     # --- Going on -------------------------------------------------------------------------------------
 
     def identity(self) -> dict[str, Any]:
-        """Return what another render must have in common with this one so that its samples are the same.
+        """Return the properties that another render must share so that its samples are the same.
 
         These are settings that the picture depends on, how paths go on, and fingerprints. Of an accelerator
         it is the name: two may differ in the last bit of a distance.
@@ -297,11 +297,11 @@ class Picture:
             If a part of the scene cannot be compared.
         """
         plan, settings = self.plan, self.plan.settings
-        scene, given = plan.scene.fingerprint(), dict[str, Any](settings.values)
+        scene, values = plan.scene.fingerprint(), dict[str, Any](settings.values)
         codes = {
-            CODE + name: fingerprint(f"the {name}", each.choices.find(given[name]))
-            for name, each in SETTINGS.items()
-            if each.identity and each.choices is not None
+            CODE + name: fingerprint(f"the {name}", declaration.choices.find(values[name]))
+            for name, declaration in SETTINGS.items()
+            if declaration.identity and declaration.choices is not None
         }
         return {
             "size": list(self.camera.size),
@@ -343,7 +343,7 @@ class Picture:
             self.file.write_if_due(partial(self.checkpoint, command))
 
     def _count_earlier(self, state: Mapping[str, Any]) -> None:
-        """Take over what a checkpoint counts beside its sums."""
+        """Take over the counts of a checkpoint, beside its sums."""
         self.rays, self.bad.count = state["rays"], state["bad"]
         self.bad.first = state["first_bad"][0], state["first_bad"][1]
 

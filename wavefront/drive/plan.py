@@ -30,11 +30,11 @@ from .jobs import SMALL_WAVE, default_wave_size
 from .prepared_scene import PreparedScene
 from .tracing import Tracer
 
-PICTURE_BYTES = 108  # of a pixel of the picture, and of what is needed to make it
+PICTURE_BYTES = 108  # of a pixel of the picture, and of the arrays that it is made from
 AOV_BYTES = 8  # of a pixel and channel of an AOV and its error
 SPARE_BYTES = 16 << 20
 LANE_BYTES = 1000  # of a lane of a wave, with its share of results that wait to be added
-PROCESS_BYTES = 70 << 20  # of a worker process beside its wave: pages it does not share, and what glibc keeps
+PROCESS_BYTES = 70 << 20  # of a worker process beside its wave: pages of its own, and memory that glibc keeps
 THREAD_BYTES = 35 << 20  # of a worker thread beside its wave: its stack, and the buffer of OpenBLAS
 GOOD_WAVE = 1 << 14  # lanes; there are fewer workers rather than smaller waves
 LEAST_WAVE = 1 << 10  # lanes; with less memory than such a wave needs there is no render
@@ -147,7 +147,7 @@ def with_choice(plan: Plan, camera: Camera) -> Plan:
 
 
 def make_plan(settings: Settings, scene: PreparedScene, camera: Camera, table: GuideTable | None) -> Plan:
-    """Return how the view of a camera is rendered, given what may guide its paths."""
+    """Return the plan of a camera's view, with the table that may guide its paths."""
     tracer = Tracer(
         seen_by(scene.compiled, camera, settings.shutter),
         SAMPLERS.find(settings.values["sampler"]),

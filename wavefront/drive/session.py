@@ -1,4 +1,4 @@
-"""The session: what drives a render, picture by picture."""
+"""The session, which drives a render picture by picture."""
 
 from __future__ import annotations
 
@@ -151,7 +151,7 @@ class Session:
         camera, framed = choose_camera(
             scene, values["camera"], values["size"], values["up"], values["view"], values["fov"]
         )
-        # before work, for what takes least; again when the memory of the scene is known
+        # before work, for the least demand; again when the memory of the scene is known
         make_budget(settings, camera.size, values["executor"] or "threads")
         self._scene = PreparedScene(scene, settings, camera, camera if framed else None)
         if camera.sensor is None:
@@ -382,7 +382,7 @@ class Session:
         self._picture.checkpoint(self.command).write(path)
 
     def identity(self) -> dict[str, Any]:
-        """Return what another render must have in common with this one so that its samples are the same.
+        """Return the properties that another render must share so that its samples are the same.
 
         These are settings, and fingerprints of the scene, the camera and functions of your own. `spp` and
         `seconds` are not part of it.
@@ -450,7 +450,7 @@ class Session:
             warn_of_long_paths(self._settings.values["max_bounces"])
 
     def _end(self) -> Image | None:
-        """Return the last picture when the work is over, or raise what ended it; None if there is none."""
+        """Return the last picture when the work is over, or raise the error that ended it; None if none."""
         picture, work, settings = self._picture, self._work, self._settings
         self._ended = True
         self._leave_workers()
@@ -513,7 +513,7 @@ class Session:
         return self._work.interrupted or self.interrupt_handler.pressed
 
     def _how_to_go_on(self) -> str:
-        """Return what a message says of the checkpoint; "" where none is kept."""
+        """Return the part of a message on the checkpoint; "" without one."""
         if self._settings.values["checkpoint"] is None:
             return ""
         path = os.fspath(self._settings.values["checkpoint"])

@@ -103,7 +103,7 @@ class Work:
             self.failure = error
 
     def _passes(self) -> Iterator[Pass]:
-        """Return what is to be done, one pass after the other."""
+        """Return the passes of the picture, one after the other."""
         picture, settings = self._picture, self._picture.plan.settings
         film, noise = picture.film, settings.values["noise"]
         if settings.quick and noise is not None:
@@ -114,21 +114,21 @@ class Work:
     def _sweeps_of(self, step: Pass, split: PassSplitter, bar: Bar) -> Iterator[bool]:
         """Put the samples of a pass on the film; yield at the end of each sweep but the last."""
         picture, scheduler, surfaces = self._picture, self._picture.scheduler, self._monitor.surfaces
-        parts = [part for rest in unfinished(picture.film, step) for part in split(rest)]
+        portions = [portion for rest in unfinished(picture.film, step) for portion in split(rest)]
 
         def waiting() -> None:
             end_with_parent()
             bar.wait(surfaces.value, scheduler.elapsed)
             self._job_done()
 
-        for job, result in self._results(scheduler.in_time(self._jobs(parts)), waiting):
+        for job, result in self._results(scheduler.in_time(self._jobs(portions)), waiting):
             picture.add(job, result)
             scheduler.job_done(job, sum(wave.seconds for wave in result))
             self._job_done()
             surfaces.reset()
             bar.advance(job.lanes, scheduler.elapsed)
             if job.pixels[-1] == step.pixels[-1] and job.end < step.last:
-                yield any(job.end == part.last for part in parts)
+                yield any(job.end == part.last for part in portions)
 
     def _job_done(self) -> None:
         """Make the geometric AOVs while workers trace the first jobs; they are stopped as these are."""
@@ -137,9 +137,9 @@ class Work:
 
     def _jobs(self, parts: Iterable[Pass]) -> Iterator[Job]:
         view, scheduler = self._picture.view, self._picture.scheduler
-        for part in parts:
+        for portion in parts:
             yield from split_jobs(
-                view, part.pixels, part.first, part.last, scheduler.job_size, scheduler.wave_size
+                view, portion.pixels, portion.first, portion.last, scheduler.job_size, scheduler.wave_size
             )
 
     def _results(self, jobs: Iterator[Job], waiting: Callable[[], None]) -> Iterator[tuple[Job, JobResult]]:
@@ -150,12 +150,12 @@ class Work:
         MemoryError
             If there is none for a few paths either.
         """
-        given: deque[Job] = deque()  # to the pool; their results have not come yet
+        queue: deque[Job] = deque()  # to the pool; their results have not come yet
 
         def remember(jobs: Iterator[Job]) -> Iterator[Job]:
             try:
                 for job in jobs:
-                    given.append(job)
+                    queue.append(job)
                     yield job
             except MemoryError as error:  # no further jobs would come
                 raise RenderError(f"out of memory: {error}") from error
@@ -163,15 +163,15 @@ class Work:
         while True:
             try:
                 for job, result in self._pool.run(remember(jobs), waiting):
-                    given.popleft()
+                    queue.popleft()
                     yield job, result
                 return
             except MemoryError:
                 self._pool.discard()
-                if not given or not self._picture.scheduler.halve(max(job.lanes_at_once for job in given)):
+                if not queue or not self._picture.scheduler.halve(max(job.lanes_at_once for job in queue)):
                     raise
-            halves = [half for job in given for half in job.halves()]
-            given.clear()
+            halves = [half for job in queue for half in job.halves()]
+            queue.clear()
             jobs = chain(halves, jobs)
 
 
