@@ -377,7 +377,9 @@ from wavefront.statistics.region import _steps_of_gain
 from wavefront.statistics.significance import _around, _p_of_mean, sidak
 from wavefront.statistics.student_t import log_gamma, t_tail
 from wavefront.testing.bsdf import _surface, check_bsdf
-from wavefront.testing.chi2 import chi_square
+from wavefront.testing.charts import CHARTS
+from wavefront.testing.chi2 import check_density, chi_square
+from wavefront.testing.report import Report
 from wavefront.textures.base import BaseTexture
 from wavefront.textures.image import Texture
 from wavefront.textures.normal_map import BumpMap, NormalMap

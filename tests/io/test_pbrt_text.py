@@ -14,6 +14,7 @@ import numpy as np
 import pytest
 from counting import calls
 from inside import SceneError, SceneFiles, Statement, main, statements, write_image
+from scipy.spatial.transform import Rotation, Slerp
 
 import wavefront as wf
 
@@ -211,6 +212,37 @@ def test_what_moves_goes_from_its_first_transform_to_its_second(tmp_path: Path) 
     np.testing.assert_allclose(at(scene.at(1).shapes[0]), [3, 1, 3], atol=1e-12)
     half = np.sqrt(0.5)  # turned by 45 degrees about (3, 0, 0)
     np.testing.assert_allclose(at(scene.at(0.5).shapes[0]), [3 + half - 2 * half, 3 * half, 3], atol=1e-12)
+
+
+def pbrts_decomposition(matrix: Any) -> tuple[Any, Any, Any]:
+    """Translation, rotation and scale as pbrt-v4's `AnimatedTransform::Decompose` computes them."""
+    linear = matrix[:3, :3]
+    rotation = linear
+    for _ in range(100):
+        rotation = (rotation + np.linalg.inv(rotation.T)) / 2
+    return matrix[:3, 3], Rotation.from_matrix(rotation), np.linalg.inv(rotation) @ linear
+
+
+def test_motion_is_that_of_pbrts_animated_transforms(tmp_path: Path) -> None:
+    """T by lerp, R by slerp the shorter way, S by lerp, of a start with shear and an end with other axes."""
+    start, end = (
+        "Scale 2 1 3 Rotate 40 1 2 3 Translate 1 0 -2",
+        "Rotate -100 0 3 1 Scale 1 0.5 2 Translate 0 4 0",
+    )
+    scene = load(tmp_path, f"{start} ActiveTransform EndTime {end} {POINT}")
+    turn = lambda degrees, axis: Rotation.from_rotvec(  # noqa: E731
+        np.radians(degrees) * np.array(axis) / np.linalg.norm(axis)
+    ).as_matrix()
+    first = np.diag([2, 1, 3]) @ turn(40, (1, 2, 3))
+    matrices = [np.eye(4), np.eye(4)]
+    matrices[0][:3, :3], matrices[0][:3, 3] = first, first @ (1, 0, -2)
+    linear = first @ turn(-100, (0, 3, 1)) @ np.diag([1, 0.5, 2])
+    matrices[1][:3, :3], matrices[1][:3, 3] = linear, matrices[0][:3, 3] + linear @ (0, 4, 0)
+    (t0, r0, s0), (t1, r1, s1) = map(pbrts_decomposition, matrices)
+    for part in (0.2, 0.5, 0.9):
+        rotation = Slerp([0, 1], Rotation.concatenate([r0, r1]))(part).as_matrix()
+        there = rotation @ ((1 - part) * s0 + part * s1) @ (1, 2, 3) + (1 - part) * t0 + part * t1
+        np.testing.assert_allclose(at(scene.at(part).shapes[0]), there, atol=1e-9)
 
 
 def test_transforms_have_times_and_the_shutter_is_that_of_the_camera(tmp_path: Path) -> None:
