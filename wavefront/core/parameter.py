@@ -72,20 +72,20 @@ def parametrized(cls: C) -> C:
     As in a dataclass, the arguments are in the order of the declarations, keyword-only ones last. The
     constructor assigns all of them, and then calls `derive`.
     """
-    found: dict[str, tuple[Parameter[Any], str]] = {}
+    declared: dict[str, tuple[Parameter[Any], str]] = {}
     made: dict[str, Any] = {}
     for base in reversed(cls.__mro__):
         made.update(vars(sys.modules[base.__module__]))  # where the annotations have their names
         for name, annotation in vars(base).get("__annotations__", {}).items():
             if isinstance(value := vars(base).get(name), Parameter):
-                found[name] = value, annotation.removeprefix("Parameter[").removesuffix("]")
+                declared[name] = value, annotation.removeprefix("Parameter[").removesuffix("]")
     arguments = {False: ["self"], True: ["*"]}
-    for parameter, kind in found.values():
+    for parameter, kind in declared.values():
         default = "" if parameter.default is MISSING else f" = default[{parameter.alias!r}]"
         arguments[parameter.kw_only].append(f"{parameter.alias}: {kind}{default}")
     known = [*arguments[False], *(arguments[True] if len(arguments[True]) > 1 else ())]
-    assigned = "".join(f"    self.{name} = {parameter.alias}\n" for name, (parameter, _) in found.items())
-    made["default"] = {parameter.alias: parameter.default for parameter, _ in found.values()}
+    assigned = "".join(f"    self.{name} = {parameter.alias}\n" for name, (parameter, _) in declared.items())
+    made["default"] = {parameter.alias: parameter.default for parameter, _ in declared.values()}
     exec(f"def __init__({', '.join(known)}) -> None:\n{assigned}    self.derive()", made)
     init = made["__init__"]
     init.__qualname__, init.__module__ = f"{cls.__qualname__}.__init__", cls.__module__

@@ -102,12 +102,12 @@ class VisibilityProbe:
         groups = np.unique(materials.group_of.take(self._seen.material))
         if all(materials.groups[group].black for group in groups):
             return "the materials of all that the camera sees reflect nothing"
-        found = self._why_no_light_arrives()
-        if found is None and self._is_enclosed:
-            found = (
+        cause = self._why_no_light_arrives()
+        if cause is None and self._is_enclosed:
+            cause = (
                 f"the camera is inside {shape_name(self._scene, self._around.prim)}, where no light gets in"
             )
-        return found or self._why_it_is_not_found()
+        return cause or self._why_it_is_not_found()
 
     def why_white(self, darkest: float) -> str:
         """Return the likely cause of a white picture."""
@@ -156,8 +156,8 @@ class VisibilityProbe:
         return bool(self._around.back_facing.all()) and len(self._around) == GRID * GRID
 
     def _surface(self, rays: Rays, hits: Hits) -> SurfaceInteraction:
-        found = hits.found
-        return interaction(self._compiled, rays.take(found), hits.take(found))
+        lanes = hits.found
+        return interaction(self._compiled, rays.take(lanes), hits.take(lanes))
 
     def _where_the_scene_is(self) -> str:
         backward = self._view.rotation[:, 2]
@@ -316,7 +316,7 @@ class NanRecorder(PathRecorder):
             self._note(f"bounce {leg.bounce}, emission that the path meets")
 
     def record_surfaces(self, scene: CompiledScene, paths: Paths, shade: Shading) -> None:
-        """Check what absorption has left of the paths, and the AOVs that the surfaces give."""
+        """Check the throughput of paths after absorption, and the AOVs of surfaces."""
         self._at = scene, shade
         self._check(_bad(paths.throughput), "absorption in front of")
         if not self.place:

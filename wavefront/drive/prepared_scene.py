@@ -103,11 +103,11 @@ class PreparedScene:
         above = camera is None or is_above(
             self.scene, camera, False, self.scene.vertical(settings.values["up"])
         )
-        given = settings.values["ground"], self.light_is_chosen, above, settings.values["background"]
-        return camera is None or choose_ground(*given) == self.ground
+        choice = settings.values["ground"], self.light_is_chosen, above, settings.values["background"]
+        return camera is None or choose_ground(*choice) == self.ground
 
     def _compile(self, settings: Settings) -> CompiledScene:
-        """Compile the scene, and note what its accelerators are built from."""
+        """Compile the scene, and note the geometries of its accelerators."""
         values = settings.values
         make_accelerator = self.scene.accelerators.maker(values["accel"])
 
@@ -145,7 +145,7 @@ class PreparedScene:
             )
 
     def flow(self, camera: Camera, settings: Settings) -> Flow:
-        """Return how what a camera sees goes on to the pictures before and after.
+        """Return the optical flow of a camera's picture to those before and after.
 
         Raises
         ------
@@ -157,12 +157,12 @@ class PreparedScene:
             raise SceneError(
                 f"at {self.scene.moment:g} s a shape has no size; flow needs a scene with all its shapes"
             )
-        own, times = settings.shutter, settings.values["flow_times"]
+        shutter, times = settings.shutter, settings.values["flow_times"]
         assert times is not None
         start = whole.start if self.scene.moment is None else self.scene.moment
         shapes = [*whole.shapes, *self.lighted.shapes[count:]]
         at = partial(self._surfaces_at, whole, camera.rolling_shutter, settings.values["accel"])
-        return Flow(shapes, camera.over_time, start if own is None else own.middle, times, at)
+        return Flow(shapes, camera.over_time, start if shutter is None else shutter.middle, times, at)
 
     def _surfaces_at(self, whole: Scene, read: float, accel: Any, time: float) -> CompiledScene:
         """Return the surfaces that there are at a time, and while a sensor is read from then on, s."""
@@ -211,16 +211,16 @@ def _exposed_for(scene: Scene, settings: Settings, camera: Camera) -> Shutter | 
 
 
 def scene_fingerprint(compiled: CompiledScene, geometries: Sequence[Geometry]) -> str:
-    """Return the fingerprint of a compiled scene and of what its accelerators were built from.
+    """Return the fingerprint of a compiled scene and of the geometries of its accelerators.
 
     Raises
     ------
     SceneError
         If a part of it, such as an attribute of a user's BSDF, cannot be compared.
     """
-    parts = {each.name: getattr(compiled, each.name) for each in fields(compiled)}
+    parts = {field.name: getattr(compiled, field.name) for field in fields(compiled)}
     accelerator, program = parts.pop("accelerator"), parts.pop("program")
-    parts["features"] = [each for each in program.features if each.compared]
+    parts["features"] = [feature for feature in program.features if feature.compared]
     del parts["specular_surfaces"]  # they follow from the rest, and the setting is compared by itself
     if compiled.media is not None:
         parts["media"] = replace(compiled.media, touching=None)  # likewise
@@ -261,11 +261,11 @@ def needs_preset(scene: Scene, settings: Settings, camera: Camera) -> bool:
         return False
     if not scene.emits or any(isinstance(light, Environment | Sky) for light in scene.lights):
         return False
-    own, usual = (_median(each, settings, camera) for each in (scene, _unlit(scene, settings, camera)))
+    own, usual = (_median(lit, settings, camera) for lit in (scene, _unlit(scene, settings, camera)))
     if not usual or not own < LITTLE * usual:
         return False
-    part = f"{100 * own / usual:.2g} % of the light of a studio"
-    warn_caller(f"the lights of the file give {part}, so lighting={DEFAULT!r} is added; None leaves it out")
+    share = f"{100 * own / usual:.2g} % of the light of a studio"
+    warn_caller(f"the lights of the file give {share}, so lighting={DEFAULT!r} is added; None leaves it out")
     return True
 
 
@@ -281,7 +281,7 @@ def _median(scene: Scene, settings: Settings, camera: Camera) -> float:
     from .session import Session  # here, as a session asks for this
 
     values = dict[str, Any](settings.values)
-    given = {name: values[name] for name in ("max_bounces", "accel")}
+    options = {name: values[name] for name in ("max_bounces", "accel")}
     bare = copy(scene)
     bare.settings = {}
     with (
@@ -298,7 +298,7 @@ def _median(scene: Scene, settings: Settings, camera: Camera) -> float:
             branches=1,
             reuse=False,
             progress=False,
-            **given,
+            **options,
         ) as session,
     ):
         image = session.run()

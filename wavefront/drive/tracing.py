@@ -65,7 +65,7 @@ class WaveMonitor:
 
 @soa
 class Tracer:
-    """How jobs are traced: what all views of a session have in common."""
+    """The tracer of jobs: all that the views of a session share."""
 
     scene: CompiledScene
     make_sampler: SamplerMaker  # from a seed and the width of a picture
@@ -158,11 +158,11 @@ def _trace_wave(tracer: Tracer, monitor: WaveMonitor, job: Job) -> WaveResult:
 
 
 def _check_radiance(integrator: Integrator, radiance: Any, lanes: int) -> None:
-    """Check the shape of what an integrator returns, which may be a user's."""
+    """Check the shape of the result of an integrator, which may be a user's."""
     if np.shape(radiance) != (3, lanes):
         name = getattr(integrator, "__name__", "integrator")
-        found = "None" if radiance is None else f"the shape {np.shape(radiance)}"
-        raise SceneError(f"{name} returns {found}; an integrator must return (3, n) = (3, {lanes})")
+        answer = "None" if radiance is None else f"the shape {np.shape(radiance)}"
+        raise SceneError(f"{name} returns {answer}; an integrator must return (3, n) = (3, {lanes})")
 
 
 def _samples(job: Job) -> Words:

@@ -28,8 +28,8 @@ class ShadowRays(Rays):
 
 def intersect(scene: CompiledScene, rays: Rays) -> Hits:
     """Return the nearest hit of each ray."""
-    found = scene.accelerator.closest(*query(scene, rays))
-    return surface_kind(scene.program.surfaces).hits_of(scene, found)
+    intersections = scene.accelerator.closest(*query(scene, rays))
+    return surface_kind(scene.program.surfaces).hits_of(scene, intersections)
 
 
 def shadow_rays(surface: SurfaceInteraction, origin: Floats, light: LightSample, lanes: Ints) -> ShadowRays:

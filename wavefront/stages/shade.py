@@ -63,12 +63,12 @@ class Shading:
     frame: Frame
     wo: Floats  # (3, n) local frame; +z if all BSDFs are view-independent
     start: Floats  # (3, n) origins of rays that leave to the side of wo, scene units
-    # lanes of each group that occurs, and its BSDF bound to them: slices in order, but for what `at` returns
+    # lanes of each group that occurs, and its BSDF bound to them: slices in order, but not those of `at`
     groups: list[tuple[Lanes, Bsdf]]
     guidance: Guidance | None = None  # of the lanes of `lit`; None where BSDFs alone choose directions
-    receiver: Receiver | None = None  # what lights are sampled for; None where no light takes it
+    receiver: Receiver | None = None  # for which lights are sampled; None where no light takes it
     volume: Ints | None = None  # lanes within media, where there is no cosine; None in scenes without media
-    crossing: Any = None  # (k, n) what light that crosses the surfaces does to stacks; likewise
+    crossing: Any = None  # (k, n) changes of stacks at the surfaces; likewise
     materials: MaterialTable | None = None  # of the scene
 
     def lit(self) -> Shading:
@@ -96,7 +96,7 @@ class Shading:
         return type(self)(*parts, groups, self.guidance_at(lanes), receiver, materials=self.materials)
 
     def guidance_at(self, lanes: Ints) -> Guidance | None:
-        """Return what guides some lanes (k,) of `lit`; None where nothing does."""
+        """Return the guidance of some lanes (k,) of `lit`; None without a guide."""
         if self.guidance is None:
             return None
         return replace(
@@ -227,7 +227,7 @@ def shading(scene: CompiledScene, surface: SurfaceInteraction) -> Shading:
 
 
 def receiver_of(surface: SurfaceInteraction, groups: list[tuple[Lanes, Bsdf]]) -> Receiver:
-    """Return what lights shine on."""
+    """Return the receiver of lights at surfaces."""
     opaque = broadcast(True, len(surface))
     if any(bsdf.transmissive for _, bsdf in groups):
         opaque = opaque.copy()
@@ -268,7 +268,7 @@ def direct(
     mis: bool,
     directed: bool = False,
 ) -> Contribution:
-    """Return direct light: what one sampled light sends to each point and on along wo.
+    """Return direct light: from one sampled light to each point, and on along wo.
 
     With `mis` it is weighted by the power heuristic against BSDF sampling. Surfaces that have
     only delta lobes get none. With `directed` it has its directions, whether a recorder needs them or not.
@@ -339,10 +339,10 @@ def radiance_at_samples(
     surface = interaction(
         scene, rays, Hits(rays.distance, prim.take(some), light.b1.take(at), light.b2.take(at))
     )
-    found = scene.lights.le(number.take(some), rays.direction, surface.take)
+    sent = scene.lights.le(number.take(some), rays.direction, surface.take)
     radiance = radiance.copy()
     if scene.program.see_through:
-        unhidden = replace(rays, media=None)  # what is around hides no surface from samples on it
-        found = found * opacities_at(Passage(scene, unhidden, surface, None, 0), scene.program.see_through)
-    radiance[:, some] = found
+        unhidden = replace(rays, media=None)  # media around it hide no surface from samples on it
+        sent = sent * opacities_at(Passage(scene, unhidden, surface, None, 0), scene.program.see_through)
+    radiance[:, some] = sent
     return radiance
