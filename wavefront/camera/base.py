@@ -79,7 +79,7 @@ class Camera(Moving, Answers):
     (array([32., 24.]), np.float64(4.0))
     """
 
-    sensor: str | None = None  # what is measured at each pixel; None where pixels are parts of a picture
+    sensor: str | None = None  # the quantity that pixels measure; None where they form a picture
     scatterings: int = 0  # of each path before it leaves the camera
     rolling_shutter: float = 0.0
     course: Motion | None = None  # of which `at` has made a moment
@@ -316,9 +316,9 @@ class Camera(Moving, Answers):
 
         Notes
         -----
-        What is more than 90° from the axis is seen, too, up to where the polynomial folds. Beyond that the
-        picture is black. Source: J. Kannala and S. Brandt, "A Generic Camera Model and Calibration Method for
-        Conventional, Wide-Angle, and Fish-Eye Lenses", IEEE PAMI 28(8), 2006.
+        Directions more than 90° from the axis are seen, too, up to the angle where the polynomial folds.
+        Beyond it the picture is black. Source: J. Kannala and S. Brandt, "A Generic Camera Model and
+        Calibration Method for Conventional, Wide-Angle, and Fish-Eye Lenses", IEEE PAMI 28(8), 2006.
 
         Examples
         --------
@@ -423,7 +423,7 @@ class Camera(Moving, Answers):
         scene, view, fov, size, up
             As for `render`.
         aperture, focus
-            As for `look_at`; by default the middle of what is framed is in focus.
+            As for `look_at`; by default the middle of the framed shapes is in focus.
 
         Raises
         ------
@@ -747,7 +747,7 @@ class Camera(Moving, Answers):
             raise SceneError(f"a camera with {kind} rays has no intrinsic matrix; a perspective one has")
         return self.projection
 
-    # --- What a render asks ---------------------------------------------------------------------
+    # --- For renders ------------------------------------------------------------------------------
 
     @property
     def size(self) -> tuple[int, int]:

@@ -28,7 +28,7 @@ def fitting_offset(balls: Balls, axes: Doubles, tangents: tuple[float, float]) -
     Parameters
     ----------
     balls
-        Centers (n, 3) and radii (n,) of what is seen.
+        Centers (n, 3) and radii (n,) of the balls that are seen.
     axes
         (3, 3) columns: right, up and backward.
     tangents

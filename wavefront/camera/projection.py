@@ -163,7 +163,7 @@ def _checked_rays(projection: Projection, x: Floats, y: Floats, size: Size) -> D
     Raises
     ------
     SceneError
-        If what a class returns is malformed, or a ray is missing that must be there.
+        If the result of a class is malformed, or a ray is missing that must be there.
     """
     offset, direction = projection.rays(x, y, size, None)
     name, shapes = type(projection).__name__, ((3, len(x)), (3, 1))

@@ -1,4 +1,4 @@
-"""The program `wavefront`: a file for each command, and what they share."""
+"""The program `wavefront`: a file for each command, and the code that they share."""
 
 from .command_line import main, parser
 

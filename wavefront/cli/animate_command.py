@@ -1,4 +1,4 @@
-"""The command `wavefront animate`: what moves in a file as an animation."""
+"""The command `wavefront animate`: the motion of a file as an animation."""
 
 from __future__ import annotations
 

@@ -16,7 +16,7 @@ PICTURE_FILE = "png, jpg, exr, hdr, npy or npz file"
 
 
 class Parser(argparse.ArgumentParser):
-    """A parser whose errors are one line, with what may have been meant."""
+    """A parser whose errors are one line, with a suggestion."""
 
     def parse_known_args(  # type: ignore[override]
         self, args: Any = None, namespace: Any = None
@@ -50,7 +50,7 @@ class Parser(argparse.ArgumentParser):
             raise argparse.ArgumentError(action, error.message + hint) from None
 
     def error(self, message: str) -> NoReturn:
-        """Say what is wrong, and end the program."""
+        """Print an error, and end the program."""
         self.exit(ERROR, f"{self.prog}: error: {message}; see {self.prog} --help\n")
 
 

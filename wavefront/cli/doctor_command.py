@@ -42,7 +42,7 @@ MOST_SPP = 1 << 16  # more than there is time for
 STANDARD_ERRORS = 5  # by which the mean of a correct picture differs in one of two million tests
 ROUNDING = 1e-5  # relative, of sums of float32 along a path
 RINGS, SIDES = 32, 64  # of the mesh that rays are timed with
-ROOM = (  # what `timed_room` returns
+ROOM = (  # the scene of `timed_room`
     f"a room with a mesh of {2 * RINGS * SIDES} triangles, a sphere of glass and one light, "
     f"in {SIZE[0]}x{SIZE[1]} pixels"
 )
@@ -58,7 +58,7 @@ class Extra:
 
 @soa
 class CheckResult:
-    """What a test found."""
+    """The result of a test."""
 
     name: str
     passed: bool

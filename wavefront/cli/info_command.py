@@ -29,7 +29,7 @@ from ..textures.image import Texture
 from .command import SCENE_FILE, add_command
 from .options import add_reading, reading
 
-UNSAID_UP = (".obj", ".ply", ".off")  # formats that do not say what is up
+UNSAID_UP = (".obj", ".ply", ".off")  # formats without an up axis
 _PACKAGE = BaseTexture.__module__.partition(".")[0] + "."
 
 
@@ -53,7 +53,7 @@ def add_info_command(commands: Any) -> None:
 
 
 def _info(options: argparse.Namespace) -> int:
-    """Say what a scene file holds; return the exit status."""
+    """Print the content of a scene file; return the exit status."""
     path = options.scene
     if options.stages:
         print(program(load(path, progress=False, **reading(options)), progress=False))

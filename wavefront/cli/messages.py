@@ -1,4 +1,4 @@
-"""What the command line says, a line each, and its exit statuses.
+"""The messages of the command line, a line each, and its exit statuses.
 
 A message that cannot be shown is lost, and ends nothing.
 """
@@ -16,13 +16,13 @@ INTERRUPTED = 130  # by SIGINT
 
 
 def print_error(error: BaseException | str) -> None:
-    """Say what went wrong."""
+    """Print an error."""
     out_of_memory = isinstance(error, MemoryError) and not str(error)
     _print_line(f"error: {'out of memory' if out_of_memory else error}")
 
 
 def print_warning(message: Warning | str) -> None:
-    """Say what should be known."""
+    """Print a note."""
     _print_line(f"warning: {message}")
 
 
@@ -32,7 +32,7 @@ def print_note(message: object) -> None:
 
 
 def print_done(text: str) -> None:
-    """Say to standard output what was written to a file, which is there in any case."""
+    """Print to standard output that a file was written; the file is there in any case."""
     _print_to(sys.stdout, text)
 
 

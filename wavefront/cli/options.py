@@ -289,7 +289,7 @@ def reading(options: argparse.Namespace) -> dict[str, Any]:
 
 
 def _name_or_number(options: argparse.Namespace) -> str | int | None:
-    """Return which animation is wanted; what is a number is one."""
+    """Return the name or the number of the animation; digits are a number."""
     wanted = getattr(options, "animation", None)
     return int(wanted) if wanted is not None and wanted.isdecimal() else wanted
 

@@ -19,7 +19,7 @@ ALWAYS = ".npz"  # can hold any picture, with all that belongs to it
 
 
 def whole_or_part(render: Callable[[], Image]) -> tuple[Image | None, int]:
-    """Return a picture, or what there is of it if its render is stopped or fails, and the exit status."""
+    """Return a picture, or its state when its render was stopped or failed, and the exit status."""
     try:
         return render(), 0
     except Interrupted as stop:

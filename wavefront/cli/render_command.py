@@ -139,7 +139,7 @@ def _save(image: Image, output: str, options: argparse.Namespace) -> int:
 
     def save(path: str | Path) -> None:
         if Path(path).suffix.lower() != Path(output).suffix.lower():
-            image.save(path)  # it may not be able to hold what the options ask for
+            image.save(path)  # the format may not hold the bits or the tone curve of the options
         else:
             image.save(path, **display_values(options), bits=options.bits)
 

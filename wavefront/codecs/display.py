@@ -29,7 +29,7 @@ class Display:
 
     gamma: Gamma = 2.2  # values are raised to 1/gamma; "srgb" is the exact sRGB curve
     exposure: float = 0.0  # stops by which the picture is brightened first
-    tone: str = AUTO  # a name of `TONES`, or what the metadata of the picture say
+    tone: str = AUTO  # a name of `TONES`, or "auto": that of the picture's metadata
     white_balance: WhiteBalance | None = None  # kelvin, or the linear RGB of something gray
 
     def __post_init__(self) -> None:

@@ -1,6 +1,6 @@
 """Which channels of an exr file are the picture.
 
-Programs name layers by what stands before the last point of a channel ("ViewLayer.Combined.R"), or put each
+Programs name layers by the text before the last point of a channel ("ViewLayer.Combined.R"), or put each
 into a part of its own. Source: OpenEXR, "Technical Introduction" and "Luminance/Chroma Images".
 """
 

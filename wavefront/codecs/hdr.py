@@ -93,7 +93,7 @@ def _original(pixels: Floats, header: str) -> Floats:
         return pixels
     with np.errstate(
         over="ignore", divide="ignore", invalid="ignore"
-    ):  # what is not finite is reported where it matters
+    ):  # values that are not finite are reported where they matter
         return (pixels / factors).astype(np.float32)
 
 

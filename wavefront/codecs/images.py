@@ -35,7 +35,7 @@ T = TypeVar("T")
 SIGNATURE_BYTES = 16
 COLOR_BYTES = 24  # of memory for each pixel of codes that become linear colors
 
-# called with a file and what it may take; returns uint8 or uint16 codes, or linear float32, (H, W, C)
+# called with a file and its budget; returns uint8 or uint16 codes, or linear float32, (H, W, C)
 Decoder: TypeAlias = Callable[[bytes, Budget], NDArray[Any]]
 # called with an adjusted picture, how it is shown, and the bits of a code; returns the file
 Encoder: TypeAlias = Callable[[ImageData, Display, int], bytes]
@@ -198,7 +198,7 @@ def decode_codes(data: bytes, name: str, budget: Budget) -> NDArray[Any]:
     name
         Of the file, or of its place in another one, for messages.
     budget
-        What it may take.
+        The memory that it may take.
 
     Raises
     ------
@@ -236,7 +236,7 @@ def _decode(name: str, decode: Callable[[bytes, Budget], T], data: bytes, kind: 
         raise SceneError(f"{name}: {error}") from error
     # decoders raise exceptions of any type on damaged data
     except Exception as error:
-        reason = error.__cause__ or error  # imageio hides what is wrong with a file behind its own error
+        reason = error.__cause__ or error  # imageio hides the cause behind its own error
         raise SceneError(f"{name}: not a readable {kind} image: {reason}") from error
     for message in said:
         warn_caller(f"{name}: {message}")
@@ -334,7 +334,7 @@ def _checked_pixels(decode: Callable[[bytes], Any]) -> Decoder:
 
 READ_ONLY = (".bmp", ".gif", ".tif", ".tiff", ".webp")
 NETPBM = (".pbm", ".pgm", ".ppm", ".pnm", ".pam", ".pfm")
-# the first bytes of files, and what reads them
+# the first bytes of files, and their readers
 SIGNED: tuple[tuple[bytes | tuple[bytes, ...], Decoder], ...] = (
     (tuple(raster.FORMATS), raster.decode),
     (pnm.SIGNATURES, pnm.decode),

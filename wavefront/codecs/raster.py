@@ -1,6 +1,6 @@
 """Pictures of codes in memory, read by Pillow: png, jpg, bmp, gif, tga, tif and webp.
 
-What is read is gray or RGB, with or without alpha, whatever the file holds: palettes, bits, transparent
+Pictures are read as gray or RGB, with or without alpha, whatever the file holds: palettes, bits, transparent
 colors (tRNS) and inks (CMYK) are resolved. Color profiles are not applied, nor is the orientation in Exif
 data, which Blender and most loaders of textures ignore. Of several frames the first one is read.
 

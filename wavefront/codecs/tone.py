@@ -95,7 +95,7 @@ def _limited(rgb: Doubles) -> Doubles:
     return np.clip(np.nan_to_num(rgb, nan=0.0, posinf=LARGEST), 0, LARGEST)
 
 
-AUTO = "auto"  # what the metadata of a picture say
+AUTO = "auto"  # the tone curve that the metadata of a picture name
 CHOSEN_TONE = "agx_punchy"  # of pictures whose light was chosen automatically
 CHOSEN_STOPS = 1.5  # by which their light is brightened before this curve, which leaves room above white
 

@@ -14,7 +14,7 @@ from ..core.errors import SceneError, as_array, finite_array
 from .color import srgb
 
 DEFAULT_MAP = "viridis"
-NO_NUMBER = (169, 169, 169, 255)  # sRGB of what is not finite, as PyVista shows it
+NO_NUMBER = (169, 169, 169, 255)  # sRGB of numbers that are not finite, as in PyVista
 MOST_HINTS = 3
 FAR = 1e6  # lengths of the table beyond its ends that count
 
@@ -26,7 +26,7 @@ class ColorMap:
     table: NDArray[np.uint8]  # (k, 4) sRGB and opacity
     limits: tuple[float, float]
     no_number: tuple[int, ...] = NO_NUMBER
-    log: bool = False  # whether the logarithms of the numbers are what counts
+    log: bool = False  # whether the logarithms of the numbers are shown
 
     def places(self, values: Doubles) -> Doubles:
         """Return the places of numbers (...) in the table, 0 to 1 within it; NaN where one is not finite."""

@@ -188,7 +188,7 @@ def _wide_silhouettes(view: DatasetView) -> Iterator[tuple[int, Mask]]:
 def _widen(info: dict[str, Any], mask: Mask, camera: Camera) -> None:
     """Replace the silhouette of an object by the wide one."""
     box = mask_box(mask)
-    assert box is not None  # what the picture shows is part of it
+    assert box is not None  # it contains the pixels in the picture
     width, height = camera.size
     info["px_count_all"] = int(mask.sum())
     info["visib_fract"] = info["px_count_visib"] / info["px_count_all"]

@@ -136,7 +136,7 @@ def write_dataset(
         layouts[name] = FLOW_LAYOUTS[name](root)
     views = _checked_cameras(cameras, settings.pop("size", None), layouts)
     display = Display(gamma, exposure, tone, white_balance)
-    if settings.get("denoise") is None:  # what learns from pictures must not learn a denoiser's ways
+    if settings.get("denoise") is None:  # a network must not learn the errors of a denoiser
         settings["denoise"] = bool(subject.settings.get("denoise"))
     asked, needed = chosen_aovs("aovs", settings.get("aovs", ())), AOVS_NEEDED
     settings["aovs"] = (*asked, *needed, *(AOVS_OF_FLOW if FLOW_LAYOUTS.keys() & set(chosen) else ()))

@@ -67,7 +67,7 @@ def camera_matrices(camera: Camera, farthest: float) -> dict[str, Any]:
     Parameters
     ----------
     camera
-        What saw the scene.
+        The camera of the view.
     farthest
         A depth that is greater than that of all points, scene units.
     """

@@ -21,7 +21,7 @@ class Aov:
 
     channels: int
     sampled: bool
-    text: str  # what it holds, and its unit
+    text: str  # its content and unit
 
 
 def _geometric(channels: int, text: str) -> Aov:
@@ -72,7 +72,7 @@ LUX = "lux"
 MEASURED_AOVS: dict[str, Aov] = {  # AOVs that measurements have, whose errors come from batches of samples
     LUX: _sampled(3, "photometric light: all, that of broadband lights, that of lights of visible watts"),
 }
-# what follows the name of such an AOV in those of its error, and the variance of a sample (Image.measured)
+# suffixes of the name of such an AOV for its error, and the variance of a sample (Image.measured)
 STANDARD_ERROR, VARIANCE = "_error", "_variance"
 NARROW = "narrow_lobes"
 # in the metadata of sensors: radiance of the brightest emitter, and how many lux that is at most
@@ -134,7 +134,7 @@ def chosen_aovs(name: str, value: Any) -> tuple[str, ...]:
     Parameters
     ----------
     name
-        What the value is called in errors.
+        Name of the value, for errors.
     value
         A name, or several: of `AOVS`, of `FLOW_AOVS`, of `KEYED_AOVS`, "noted.NAME", "boxes" or "all".
 
@@ -161,7 +161,7 @@ def chosen_aovs(name: str, value: Any) -> tuple[str, ...]:
 GUIDES = "denoising_albedo", "denoising_normal"  # the AOVs that guide denoisers
 BEFORE_DENOISING = "before_denoising"  # in the metadata of the samples of pictures that are denoised
 NOISY = "noisy"  # the AOV that holds `rgb` as it was before denoising
-# what the names of AOVs that hold radiance begin with
+# beginnings of the names of AOVs that hold radiance
 RADIANCE = (NOISY, "direct", "indirect", "light_groups.", CLAMPED)
 
 

@@ -31,7 +31,7 @@ LARGEST_NARROW = NARROW_TERMS << FRACTION_BITS
 
 @soa
 class AovEstimate:
-    """What the samples of an AOV come to."""
+    """The mean of the samples of an AOV, and its error."""
 
     mean: Floats  # (pixels, c)
     standard_error: Floats | None  # (pixels, c) of `mean`; NaN for fewer than two samples; None: it has none

@@ -1,8 +1,8 @@
 """Checkpoints: renders that were begun, as files from which they go on.
 
-A checkpoint is an npz file (`core/npz.py`), as that of a picture with its sums, but without what follows from
-the sums. "checkpoint" is JSON text, with what a render needs to go on, and comes first. Nothing is pickled:
-reading runs no code of the file.
+A checkpoint is an npz file (`core/npz.py`), as that of a picture with its sums, but without values that
+follow from the sums. Its first member, "checkpoint", is JSON text with all else that a render needs to go on.
+Nothing is pickled: reading runs no code of the file.
 """
 
 from __future__ import annotations
@@ -50,7 +50,7 @@ class Checkpoint:
 
     sums: PictureSums
     metadata: dict[str, Any]  # of the picture so far
-    state: dict[str, Any]  # what a render counts, and the first sample of the pass
+    state: dict[str, Any]  # the counters of a render, and the first sample of the pass
     pixels: NDArray[Any] | None  # row-major indices of those in the pass; None: all
     command: dict[str, Any] | None = None  # the call of the command line that began it
 
@@ -189,12 +189,12 @@ def check_identity(
     before, now
         The identities of the two renders, which must agree.
     otherwise
-        What the message says besides.
+        Further words of the message.
 
     Raises
     ------
     SceneError
-        If not. The message names what differs.
+        If not. The message names the differences.
     """
     changed = differences(before, now)
     if changed:

@@ -358,7 +358,7 @@ class Film(Sums):
 
 @soa
 class Estimates:
-    """What the samples on a film come to."""
+    """The means of the samples on a film, and their errors."""
 
     mean: Floats  # (pixels, 3)
     variance: Floats  # (pixels, 3) of one sample; NaN for fewer than two

@@ -1,4 +1,4 @@
-"""What identifies a render: two with the same identity have the same samples."""
+"""The identity of a render: two renders with the same one have the same samples."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Sums of what paths from lights add to pixels.
+"""Sums of the light that paths from lights add to pixels.
 
 Paths from lights reach any pixel, any number of times. The sums are exact, so that they do not depend on the
 order in which paths are traced.

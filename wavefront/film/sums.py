@@ -1,4 +1,4 @@
-"""What all sums of samples have in common: fields that files keep, and that merging adds up."""
+"""The base class of sums of samples: fields that files keep, and that merging adds up."""
 
 from __future__ import annotations
 

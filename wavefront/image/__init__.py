@@ -1,4 +1,4 @@
-"""Finished pictures: what a render returns, and how pictures are compared."""
+"""Finished pictures, as a render returns them, and their comparison."""
 
 from .image import Image
 

@@ -511,7 +511,7 @@ class Image(Answers):
     def resize(self, size: ImageSize) -> Image:
         """Return the colors in another size: each pixel is the mean of the area that it covers.
 
-        What is known of single pixels, such as errors and AOVs, is left out.
+        Values of single pixels, such as errors and AOVs, are left out.
 
         Parameters
         ----------
@@ -869,8 +869,8 @@ class Image(Answers):
         name
             "flow", to the picture after this one, or "flow_back", to the one before.
         hidden
-            Whether what the other picture does not show has a flow, too. Without it the AOV "flow_occluded"
-            or "flow_back_occluded" is needed.
+            Whether points that the other picture does not show have a flow, too. Without it the AOV
+            "flow_occluded" or "flow_back_occluded" is needed.
 
         Raises
         ------
@@ -1115,7 +1115,7 @@ def _add_aovs(image: Image, sums: PictureSums) -> None:
 
 
 def _add_light_tracing(image: Image, light: LightSums) -> None:
-    """Add what paths from lights have found, all of it indirect light, to that layer of a picture."""
+    """Add the light of paths from lights, all of it indirect, to that layer of a picture."""
     layer, error = (values.reshape(-1, 3) for values in (image.layers["indirect"], image.errors["indirect"]))
     for pixels in chunks(len(layer)):
         layer[pixels] += light.mean(pixels).T

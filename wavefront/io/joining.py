@@ -56,7 +56,7 @@ def join(
 
 
 def stacked(name: str, meshes: Sequence[Mesh | RawMesh]) -> RawMesh:
-    """Return one mesh with the triangles of all, and what all of them have per vertex."""
+    """Return one mesh with the triangles of all, and the values per vertex that all of them have."""
     starts = np.cumsum([0] + [len(mesh.vertices) for mesh in meshes])
     faces = np.concatenate([mesh.faces + start for mesh, start in zip(meshes, starts[:-1], strict=True)])
     columns = {column: _joined([getattr(mesh, column) for mesh in meshes]) for column in COLUMNS}

@@ -78,13 +78,13 @@ class Losses:
         Parameters
         ----------
         part
-            What it is.
+            Its name.
         place
             Where it stands: a line or an element of the file, or of another file, whose name is first then.
         value
             The value that was found.
         done
-            What was done about it.
+            The remedy.
         """
         where = place if place.startswith(self.name) else f"{self.name}: {place}" if place else self.name
         self._noted[Loss(where, part, value, done)] = None
@@ -113,7 +113,7 @@ class Losses:
         place
             As of `note`.
         done
-            What is done without that part.
+            The remedy, if that part is damaged.
         malformed
             Errors of other types that mean damage, too.
         """
@@ -130,7 +130,7 @@ class Losses:
         return limited
 
     def take(self, losses: Iterable[Loss], notices: Iterable[Loss] = ()) -> None:
-        """Note what another list of the same file has."""
+        """Take over the losses of another list of the same file."""
         self._noted.update(dict.fromkeys(losses))
         self._notices.update({} if self.strict else dict.fromkeys(notices))
 
@@ -186,7 +186,7 @@ class Losses:
         return self
 
     def __exit__(self, kind: type[BaseException] | None, *_: object) -> None:
-        """Say what was noted, unless the block failed."""
+        """Report the losses, unless the block failed."""
         self._stack.close()
         if kind is None:
             self.report()

@@ -145,7 +145,7 @@ class Wanted(NamedTuple):
 
     node: Any
     output: str  # which of its outputs
-    kind: str  # the type of what it is connected to
+    kind: str  # the type of the input that reads it
     named: str  # the node, for messages
     value: Callable[[str], Value]  # of an input
 
@@ -521,7 +521,7 @@ def _combined(function: Callable[..., Any], arguments: list[Value]) -> Value:
         argument if isinstance(argument, BaseTexture) else np.asarray(argument, f4) for argument in arguments
     ]
     ones = all(np.all(argument == 1) for argument in known if not isinstance(argument, BaseTexture))
-    if function is operator.mul and len(textures) == 1 and ones:  # a texture keeps what is known of it
+    if function is operator.mul and len(textures) == 1 and ones:  # a texture stays one, with its limits
         return textures[0]
     return arguments[0] if function is _same else computed(function, *known, rising=False)
 
@@ -550,7 +550,7 @@ TRANSLATIONS: dict[Any, Callable[[_Document, str, dict[str, Value]], dict[str, V
     "UsdPreviewSurface": _Document._of_usd,
     "disney_principled": _Document._of_disney,
 }
-# what becomes of nodes that are no functions of each channel
+# the values of nodes that are no functions of each channel
 NODES: dict[str, Callable[[_Document, Wanted], Value]] = {
     **dict.fromkeys(IMAGES, _Document._colors),
     "normalmap": _Document._normal,

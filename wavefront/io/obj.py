@@ -35,7 +35,7 @@ OFF = ("off", "0")  # values that switch a keyword off
 NAMED = ("usemtl", "mtllib", "o ", "g ")  # statements with a name, which may contain a #
 LEAST = {"v": 3, "vt": 1, "vn": 3, "f": 3}  # least number of words of a line
 MOST = {"v": 6, "vt": 2, "vn": 3}  # number of words of a line that are read
-# what stands for a damaged line, and what the note says of it
+# the replacement of a damaged line, and the words for it in the note
 INSTEAD = {
     "v": ("v nan nan nan", "its faces are left out"),
     "vt": ("vt 0 0", "0 0 in its place"),
@@ -63,7 +63,7 @@ class Kind(NamedTuple):
     keyword: str = ""  # v, vt, vn or f; empty for all others
     width: int = 0  # number of words that follow
     form: str = ""  # of f: the corners with 1 for every number; empty if they differ
-    fault: str = ""  # what is wrong with it
+    fault: str = ""  # the error in it
 
 
 @dataclass

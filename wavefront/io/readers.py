@@ -25,7 +25,7 @@ from .sources import LoadLimits, PathLike, SceneFiles
 class LoadOptions:
     """Options of reading a file."""
 
-    losses: Losses  # where what is damaged, unknown or not supported is noted
+    losses: Losses  # where damaged, unknown and unsupported parts are noted
     materials: bool = True  # read materials
     limits: LoadLimits = field(default_factory=LoadLimits)
     search_paths: tuple[Path, ...] = ()  # folders whose files the file may refer to, beside its own

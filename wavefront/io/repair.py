@@ -142,7 +142,7 @@ def build(source: str, raw: RawMesh, losses: Losses) -> Mesh | None:
 
 
 def _mesh(losses: Losses, label: str, raw: RawMesh, vertices: Table, faces: Faces) -> Mesh:
-    """Return a mesh of sound vertices and faces, with what it has beside them."""
+    """Return a mesh of sound vertices and faces, with its normals, colors and other values."""
     return Mesh(
         vertices,
         faces,

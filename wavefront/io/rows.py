@@ -1,6 +1,6 @@
 """Rows of numbers and lists as whole columns, as PLY and OFF have them, and the faces in such lists.
 
-What is damaged is marked, or noted and left out.
+Damaged rows are marked, or noted and left out.
 """
 
 from __future__ import annotations

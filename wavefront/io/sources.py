@@ -34,7 +34,7 @@ MAX_TRIANGLES = 2**26  # of all meshes of a file by default
 
 @dataclass(frozen=True)
 class LoadLimits:
-    """Limits of what a scene file may ask for. A file of a few bytes can claim any size.
+    """Limits of the demands of a scene file. A file of a few bytes can claim any size.
 
     Each limit is a whole number of at least 1. Larger limits accept larger files; smaller ones protect
     better.
@@ -249,7 +249,7 @@ class SceneFiles:
         Parameters
         ----------
         reference
-            What the scene calls it.
+            Its name in the scene.
         read
             Returns it, or raises a SceneError.
         place

@@ -93,7 +93,7 @@ def _text(losses: Losses, text: str) -> list[RawMesh]:
 
 
 def _kind(number: int, line: str) -> tuple[str, str]:
-    """Return the keyword of a line, if it matters, and what is done about it if it is damaged."""
+    """Return the keyword of a line, if it matters, and the remedy if it is damaged."""
     keyword, *rest = words(line.lower()) or [""]
     if keyword == "vertex":
         sound = len(rest) == 3 and all(map(NUMBER.fullmatch, rest))

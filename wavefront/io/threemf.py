@@ -322,7 +322,7 @@ class _Model:
         return matrix
 
 
-# what is read of each element when it begins
+# the readers of elements, at their beginnings
 ELEMENTS: dict[str, Callable[[_Model, str, dict[str, str]], None]] = {
     "model": _Model._unit,
     "basematerials": _Model._begin_group,

@@ -43,7 +43,7 @@ def as_scene(
     subject
         As for `render`.
     material
-        What bare meshes are made of; None leaves everything as it is.
+        The material of bare meshes; None leaves everything as it is.
     progress
         As for `load`.
     smooth
@@ -143,13 +143,13 @@ def choose_camera(
     Parameters
     ----------
     scene
-        What is seen.
+        The scene that is seen.
     camera
         In place of the scene's own. Without either the scene is framed, and with a `view`.
     size
         (width, height) in pixels, in place of the camera's.
     up
-        What is up in the scene, as for `render`: it turns the camera that frames it.
+        The up axis of the scene, as for `render`: it turns the camera that frames it.
     view, fov
         As for `render`.
     turning

@@ -1,4 +1,4 @@
-"""Files of grids for media: arrays of NumPy, Mitsuba's volumes, and what libraries read."""
+"""Files of grids for media: arrays of NumPy, Mitsuba's volumes, and files that libraries read."""
 
 from __future__ import annotations
 

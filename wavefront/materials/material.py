@@ -1,4 +1,4 @@
-"""What a surface is made of."""
+"""Materials of surfaces."""
 
 from __future__ import annotations
 

@@ -12,7 +12,7 @@ from ..textures.parameter import Color
 
 METAL_ROUGHNESS = 0.2
 
-# What has measured constants (Conductor and Dielectric) has no color to choose; all others are made for
+# Materials of measured constants (Conductor and Dielectric) have no color to choose; all others are made for
 # their look, with a color by default.
 _FIXED: dict[str, Callable[[], Bsdf]] = {
     **{name: lambda name=name: Conductor.named(name, METAL_ROUGHNESS) for name in METALS},  # type: ignore[misc]

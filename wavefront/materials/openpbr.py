@@ -28,7 +28,7 @@ BESIDE_GLASS = (
     "geometry_thin_walled",
     "specular_roughness_anisotropy",
 )
-LEAST_COLOR = f4(1e-4)  # of what passes `transmission_depth`
+LEAST_COLOR = f4(1e-4)  # of the light that passes `transmission_depth`
 
 
 class OpenPBR(Material):

@@ -1,4 +1,4 @@
-"""What sensors have measured, and its error."""
+"""Measurements by sensors, with their errors."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The units of what sensors measure."""
+"""The units of measurements."""
 
 UNITS = {
     "irradiance": "W·m⁻²",
@@ -7,7 +7,7 @@ UNITS = {
     "arriving flux": "W",
     "leaving flux": "W",
 }
-# what `lux` is called in tables, and its unit
+# the name of `lux` in tables, and its unit
 PHOTOMETRIC = {
     "irradiance": ("lux", "lux"),
     "fluence": ("lux", "lux"),

@@ -1,4 +1,4 @@
-"""What a user puts together: the scene, and ready-made light."""
+"""Scenes, as users put them together, and ready-made light."""
 
 from .scene import Scene
 

@@ -46,9 +46,9 @@ class FileMoments:
         return self._samples
 
     def at(self, scene: Scene, time: float) -> tuple[list[Shape], list[Light], Camera | None]:
-        """Return shapes, lights and camera of a time: those of the file, and what was added to the scene.
+        """Return shapes, lights and camera of a time: those of the file, and those added to the scene.
 
-        What has not changed is the object of the scene itself, with its textures and tables.
+        Elements that have not changed are the objects of the scene itself, with their textures and tables.
         """
         fresh = self._read(time)
         mine = {id(element) for element in (*self._shapes, *self._lights)}  # not kept: a copy has other ids

@@ -1,4 +1,4 @@
-"""What of a file a scene does not show as the file says."""
+"""Losses: parts of a file that a scene does not show as the file says."""
 
 from __future__ import annotations
 
@@ -19,11 +19,11 @@ class Loss:
     place
         The file, and where in it: a line or an element.
     part
-        What it concerns.
+        The part of the file.
     value
         The value that was found, as text; "" where there is none to name.
     done
-        What was done; "not honored" where it has no effect.
+        The remedy; "not honored" where the part has no effect.
 
     Examples
     --------

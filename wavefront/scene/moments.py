@@ -1,4 +1,4 @@
-"""A scene that moves, at a time: what stands still is shared, and many instances are placed together."""
+"""A scene that moves, at a time: still objects are shared, and many instances are placed together."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ MOMENTS = 17  # times that say how far a moving scene reaches
 
 
 class Moments:
-    """What moves among the shapes of a scene.
+    """The shapes of a scene that move.
 
     Parameters
     ----------

@@ -125,13 +125,13 @@ class Scene(Answers):
         self.up = up
         self.settings = mapping("Scene settings", settings)
         self.medium = medium
-        self.losses: tuple[Loss, ...] = ()  # what of its file it does not show as the file says
+        self.losses: tuple[Loss, ...] = ()  # parts of its file that it does not show as the file says
         self.lights_of_file: list[int] | None = None  # their ids, where it was read from a file
         self.animations: tuple[str, ...] = ()
         self.moment: float | None = None
         self.file_moments: FileMoments | None = None  # where its file is read anew for each time
         self._whole: Scene | None = None  # of which this is a moment
-        self._moments: Moments | None = None  # what moves, and how far it reaches, once it was asked for
+        self._moments: Moments | None = None  # the shapes that move, once they were asked for
         self._reach: Doubles | None = None
         self.accelerators = AcceleratorCache()  # of the last render, for the next one
         self.check()
@@ -185,7 +185,7 @@ class Scene(Answers):
 
     @property
     def medium(self) -> BaseMedium | None:
-        """What fills all space around the shapes; None for nothing."""
+        """The medium that fills all space around the shapes; None for nothing."""
         return self._medium
 
     @medium.setter
@@ -235,7 +235,7 @@ class Scene(Answers):
 
     @property
     def _moving(self) -> Moments:
-        """What moves among the shapes."""
+        """The shapes that move."""
         if self._moments is None or not self._moments.fits(self.shapes):
             self._moments, self._reach = Moments(self.shapes), None
         return self._moments
@@ -274,8 +274,8 @@ class Scene(Answers):
     def at(self, time: float) -> Scene:
         """Return the scene at a time, in which nothing moves.
 
-        What does not move is shared with this scene: meshes, textures, and the trees of the last render. The
-        first call looks for what moves; further ones take 0.2 s for 100 000 moving instances.
+        Still objects are shared with this scene: meshes, textures, and the trees of the last render. The
+        first call looks for motions; further ones take 0.2 s for 100 000 moving instances.
 
         Parameters
         ----------

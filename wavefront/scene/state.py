@@ -1,4 +1,4 @@
-"""What a scene is made of, to find out whether it was changed."""
+"""The state of a scene, which tells whether it was changed."""
 
 from __future__ import annotations
 

@@ -159,7 +159,7 @@ def check_view(name: str, value: Any) -> Any:
 
 
 def check_up(name: str, value: Any) -> Any:
-    """Check what is up: a vector, the name of an axis, or "auto"."""
+    """Check an up axis: a vector, the name of an axis, or "auto"."""
     return value if isinstance(value, str) and value == AUTO else upward(name, value)
 
 
@@ -232,7 +232,7 @@ EXCLUSIONS = (
     Exclusion("samples", "seconds", f"{GIVEN}, and the time decides how many there are"),
 )
 
-# When something is asked for, given all settings; what is not here is asked for where it is not None.
+# When a setting is asked for, given all settings; others are asked for where they are not None.
 ASKED: dict[str, Callable[[Mapping[str, Any]], bool]] = {
     "reuse": lambda values: values["reuse"] is True,
     "guide": lambda values: values["guide"] is True,
@@ -279,7 +279,7 @@ def check_combinations(values: Mapping[str, Any]) -> None:
 
 
 def left_out(values: Mapping[str, Any], name: str) -> bool:
-    """Return whether "auto" must leave a setting out, because of what is asked for."""
+    """Return whether "auto" must leave a setting out, because of other settings."""
     return any(rule.one == name and asked_for(values, rule.other) for rule in _both_ways())
 
 

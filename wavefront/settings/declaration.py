@@ -71,10 +71,10 @@ WIDTH = 100  # of a line of documentation
 
 @dataclass(frozen=True)
 class Setting:
-    """What is declared of a setting, beside its name."""
+    """The declaration of a setting, without its name."""
 
     default: Any  # its value where none is given
-    text: str  # what it means, for documentation; what does not go with it is added from the table of that
+    text: str  # its documentation; settings that exclude it are added from their table
     option: str | None = None  # the help text of its command-line option; None where it has none
     check: SettingCheck | None = None  # checks a value that was given, and returns it as it is kept
     choices: Registry[Any] | None = None  # the table of its names

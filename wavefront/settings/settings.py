@@ -25,7 +25,7 @@ LITTLE_NOISE = 0.02  # at which a picture ends by itself
 CLEAN = 0.05  # likewise, where it is denoised then: mean error of lit pixels
 MAX_BRANCH_SAMPLES = 2**32  # a sample's index is 32 bits of its address, and each branch has one
 TRAINING = 0x5EED_0F_9417D  # the seed of a training pass is that of the picture XOR this
-# What happens where nothing says when a picture ends: in metadata, by the bar and by `wavefront info`
+# The end of a picture where no setting states it: in metadata, by the bar and by `wavefront info`
 CLEAN_END = (
     f"once it is clean, at a mean error of {CLEAN:.0%} of lit pixels or {DEFAULT_SPP} samples per pixel, "
     f'and denoised; quality="reference" takes {DEFAULT_SPP} and does not denoise'
@@ -143,7 +143,7 @@ class Settings:
 
     @property
     def background_color(self) -> Floats | None:
-        """What camera rays that miss show, (3, 1), black where it is transparent; None: the environment."""
+        """Color of camera rays that miss, (3, 1), black where it is transparent; None: the environment."""
         if self.values["background"] is None:
             return None
         return (

@@ -57,10 +57,10 @@ class Shape(Moving, Answers, ABC):
 
     name = Name(text)
     framed: bool = True
-    _material: Material | None = None  # what was given
-    # what a user may change of a shape that moves, and has at all times
+    _material: Material | None = None  # the user's
+    # attributes that a user may change on a shape that moves, and that it has at all times
     _given: tuple[str, ...] = ("name", "_material", "_emission", "colors")
-    _rest: Any = None  # what `motion` carries, where the shape itself is not as it was made
+    _rest: Any = None  # the shape that `motion` carries, where it is not this one
 
     @property
     def material(self) -> Material:

@@ -78,7 +78,7 @@ def GridBox(medium: GridMedium, *, priority: int | None = None, name: str = "gri
     Parameters
     ----------
     medium
-        What is inside, and where.
+        The medium inside, and its place.
     priority, name
         As for `Material` and `Mesh`.
 

@@ -27,7 +27,7 @@ def over_time(
     times
         (t,) seconds, rising; None for a shape that keeps its form.
     arrays
-        (t, n, 3), or what stays, by the names of attributes.
+        (t, n, 3), or arrays that stay the same, by the names of attributes.
 
     Raises
     ------

@@ -25,7 +25,7 @@ AXES = ("x", "y", "z")
 
 @dataclass(frozen=True)
 class Coloring:
-    """What a shape's numbers are, and how they are shown."""
+    """The numbers of a shape, and how they are shown."""
 
     scalars: Any  # numbers, or the name of some
     cmap: Any = None

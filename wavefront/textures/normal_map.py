@@ -26,7 +26,7 @@ class BaseNormalMap(ABC):
     mirrors_hidden: bool = False
     # tilted normals shadow light that grazes the surface, as if they were those of microfacets
     shadows_grazing: bool = False
-    # what a material scatters to below the surface is mirrored at it; False: it is lost
+    # light that a material scatters to below the surface is mirrored at it; False: it is lost
     folds_light: bool = True
 
     def scaled(self, factor: float) -> BaseNormalMap:

@@ -28,7 +28,7 @@ class BackgroundDenoiser:
     Parameters
     ----------
     done
-        Called with each picture and what became of it, in the denoiser's thread.
+        Called with each picture and the denoised one, in the denoiser's thread.
     fail
         Called with an error, in the same thread; the next picture may do.
     """

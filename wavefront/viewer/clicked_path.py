@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
     PathOf = Callable[[Viewpoint, tuple[int, int]], PathVertices]
 
-PATH, LIGHT = "/path", "/light samples"  # what is drawn
+PATH, LIGHT = "/path", "/light samples"  # the drawn parts
 COLORS = {PATH: (230, 90, 12), LIGHT: (255, 230, 50)}
 THICKNESS = 3.0  # pixels
 LIGHT_LENGTH, FREE_LENGTH = 0.15, 1.0  # of directions that lead to lights, and out of the scene; radii
@@ -33,11 +33,11 @@ class ClickedPath:
     server
         That of viser.
     viewpoint
-        Returns what the page shows.
+        Returns the view of the page.
     path_of
         Traces the path of a pixel (x, y) of a view.
     say
-        Called with what is wrong.
+        Called with errors.
     """
 
     def __init__(
@@ -50,7 +50,7 @@ class ClickedPath:
         server.scene.on_click()(self._clicked)
 
     def _ticked(self, event: Any) -> None:
-        """Take away what is shown when the box is left."""
+        """Remove the path when the box is unchecked."""
         if not self.box.value:
             self._clear()
 

@@ -53,7 +53,7 @@ class Guard:
     host
         Where the server listens.
     token
-        What requests must have as `token=`; "" for none.
+        The `token=` that requests must have; "" for none.
     """
 
     def __init__(self, host: str, token: str) -> None:

@@ -56,7 +56,7 @@ BUTTON = (
 
 @dataclass(frozen=True)
 class TimeControls:
-    """What sets the time of a scene that moves."""
+    """The controls of the time of a scene that moves."""
 
     span: tuple[float, float]  # start and end, seconds
     seek: Callable[[float], object]
@@ -141,7 +141,7 @@ class Page:
 
     @property
     def viewpoint(self) -> Viewpoint:
-        """What the page shows."""
+        """The view of the page."""
         with self._lock:
             return self._viewpoint
 
@@ -168,7 +168,7 @@ class Page:
             self._server.stop()
         self._server._thread_executor.shutdown(wait=True)
 
-    # --- What the page has ----------------------------------------------------------------------------
+    # --- Elements of the page --------------------------------------------------------------------------
 
     def _add_camera(self) -> None:
         view = self._viewpoint
@@ -247,7 +247,7 @@ class Page:
         button = f'<button style="{BUTTON}" data-code="{code}" onclick="{COPY}">copy camera as code</button>'
         return f'<div style="padding:0 0.6em 0.6em">{button}</div>'
 
-    # --- What the page says ---------------------------------------------------------------------------
+    # --- Events of the page ----------------------------------------------------------------------------
 
     def _on(self, act: Callable[[Any], object]) -> Callable[[Any], Any]:
         """Return the callback of viser's event loop, in the order of the messages; bad values are ignored."""
@@ -281,7 +281,7 @@ class Page:
             with self._lock:
                 self._sized = False
             self._server.scene.set_background_image(None)
-            trim_heap()  # of what connections took
+            trim_heap()  # memory that connections took
 
     def _resize(self, camera: Any) -> None:
         self._change(self.viewpoint.resized(camera.image_width, camera.image_height))
@@ -322,7 +322,7 @@ class Page:
             png = png_jpeg.encode(codes, ".png", 2.2)
             event.client.send_file_download("wavefront.png", png, save_immediately=True)
 
-    # --- What the page shows --------------------------------------------------------------------------
+    # --- Pictures of the page --------------------------------------------------------------------------
 
     def _picture(self) -> bytes | None:
         """Return the picture that is shown, as a jpg; None if there is none yet."""

@@ -75,7 +75,7 @@ class Refiner:
         self._looked_at.set()
 
     def look(self, camera: Camera) -> None:
-        """Show what a camera sees from now on. It can be called from any thread, and returns at once."""
+        """Show the view of a camera from now on. It can be called from any thread, and returns at once."""
         with self._lock:
             self._wanted = camera
             self._changed()
@@ -122,7 +122,7 @@ class Refiner:
                 if other is not None:
                     self._take(other)
                 self._render(camera, done)
-            except Exception as error:  # what a user's own material raises, too: the loop goes on
+            except Exception as error:  # also of a user's own material: the loop goes on
                 self._fail(error)
 
     def _take(self, session: Session) -> None:

@@ -13,9 +13,9 @@ from ..film.aov_names import GUIDES
 from ..image import Image
 from ..image.plot import aov_colors, id_colors
 
-BACKDROP = 0.85  # gray behind what is transparent
+BACKDROP = 0.85  # gray behind transparent pixels
 
-CHOICES = {  # what the page lists, and the layers that it needs
+CHOICES = {  # the choices of the page, and the layers that each needs
     "rgb": (),
     "albedo": ("albedo",),
     "normal": ("normal",),

@@ -78,7 +78,7 @@ class Viewer:
     renew
         Makes a session of the scene as it is now; None where it cannot change.
     state
-        Returns what differs once the scene has been changed; None if nobody is to look.
+        Returns the state of the scene, which differs once it was changed; None if nobody is to look.
     tone
         The first tone curve.
     spp

@@ -1,4 +1,4 @@
-"""From what a page says to a camera, and back."""
+"""From the view of a page to a camera, and back."""
 
 from __future__ import annotations
 
@@ -97,7 +97,7 @@ class Viewpoint:
         bounds
             (2, 3) of the scene.
         up
-            (3,) what is up in the scene: around it the page turns, unless the camera is rolled.
+            (3,) up axis of the scene: the page turns around it, unless the camera is rolled.
         """
         around = Surroundings.of(bounds)
         ahead = -camera.rotation[:, 2]

@@ -1,6 +1,6 @@
 """COLLADA (.dae), read by pycollada after a check of its references, and materials by trimesh.
 
-Positions become meters by the `unit` of the file. The scene is told what is up by its `up_axis`.
+Positions become meters by the `unit` of the file. Its `up_axis` is the up axis of the scene.
 """
 
 from __future__ import annotations

@@ -29,7 +29,7 @@ NO_PAIRS = np.isin(np.arange(25), [1, 6, 7, 8, 12, 13, 17, *range(4, 25, 5), *ra
 UNCHECKED = re.compile(rb"<(?:\w+:)?polygons\b")  # whose indices pycollada counts all together
 PRIMITIVES = ("triangles", "polylist", "polygons", "tristrips", "trifans")
 MOST = 2**31  # an index where nothing limits it
-NO_NUMBER, NO_INDEX = "1e39", -1  # what has one of these is left out
+NO_NUMBER, NO_INDEX = "1e39", -1  # faces with one of these are left out
 
 
 def is_doubtful(data: bytes) -> bool:

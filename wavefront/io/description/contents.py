@@ -55,7 +55,7 @@ class Contents:
         return scene
 
     def smooth(self, smooth: bool | float | str) -> None:
-        """Say what normals the meshes get, as for `load`: "auto" keeps those of the file."""
+        """Choose the normals of the meshes, as for `load`: "auto" keeps those of the file."""
         for raw in self.raws:
             if smooth != AUTO:
                 raw.normals = raw.tangents = None

@@ -28,7 +28,7 @@ from .entity import Entity, Table
 
 MOST_INCLUDED = 15  # files inside each other
 GRAY = Material(Diffuse(0.5))
-# what stands for a part that is not supported, by its kind, and what the warning says of it
+# the replacement of an entity that is not supported, by its kind, and the words for it in the warning
 INSTEAD: dict[str, tuple[Any, str]] = {
     **dict.fromkeys(("bsdf", "material"), (GRAY, "a gray Diffuse in its place")),
     **dict.fromkeys(("rfilter", "filter"), ({}, "the default in its place")),
@@ -77,8 +77,8 @@ class Conversion:
     files: SceneFiles
     find: Callable[[str], Path]  # the path of a file that the scene names
     read_mesh: Callable[[Path], list[RawMesh]]
-    made: dict[Any, Any] = field(default_factory=dict)  # what was converted already
-    making: list[Entity] = field(default_factory=list)  # what refers to what is converted now
+    made: dict[Any, Any] = field(default_factory=dict)  # the objects of entities
+    making: list[Entity] = field(default_factory=list)  # being converted, each within the one before
     triangles: int = 0
     instances: int = 0
     instead: dict[str, tuple[Any, str]] = field(default_factory=lambda: dict(INSTEAD))

@@ -40,7 +40,7 @@ class Maker(NamedTuple):
     reads: tuple[str, ...] | None = None  # parameters that count; None: those that `convert` reads
     holds: tuple[str, ...] = ()  # kinds of entities in it that count, whatever their names
     harmless: tuple[str, ...] = ()  # parameters that do not change the picture
-    note: str = ""  # what is different, for the documentation
+    note: str = ""  # differences, for the documentation
 
 
 class Table:
@@ -49,7 +49,7 @@ class Table:
     Parameters
     ----------
     name
-        What the format is called in messages.
+        Name of the format, for messages.
     harmless
         Parameters of all entities of a kind that do not change the picture.
     """
@@ -112,7 +112,7 @@ class Entity:
     values: dict[str, Any]  # of parameters, and the entities that it holds
     job: Any  # the conversion of which it is a part
     variant: str = ""  # of its kind, such as that of textures of numbers
-    title: str = ""  # what it is, for messages, where the place does not say it
+    title: str = ""  # its name in messages, where the place does not tell it
     types: dict[str, str] = field(default_factory=dict)  # of values that are lists, where a format has types
     matrix: Matrix = field(default_factory=lambda: IDENTITY)  # to the world, where it was stated
     state: Any = None  # what else was in force there
@@ -201,7 +201,7 @@ class Entity:
         Raises
         ------
         KeyError
-            If the table says what counts, and this does not.
+            If the table lists the parameters that are read, and this is none of them.
         SceneError
             If it is of another type, or has no value.
         """

@@ -32,7 +32,7 @@ class Places:
     # (n,) of the placed shapes, "" for that of the mesh; None for all of these
     names: list[str] | None = None
     materials: list[Material | None] | None = None  # the same, in place of those of the meshes
-    motions: list[Motion | None] | None = None  # the same, of what moves: the matrices are those of the start
+    motions: list[Motion | None] | None = None  # of those that move; the matrices are of the start
 
     @classmethod
     def once(cls, count: int) -> Places:
@@ -141,7 +141,7 @@ def place_meshes(name: str, raws: list[RawMesh], places: Places, losses: Losses)
 
 def moved_raw(raw: RawMesh, matrix: Matrix) -> RawMesh:
     """Return a mesh moved by a (4, 4) matrix."""
-    with np.errstate(all="ignore"):  # what is not finite is found, and said, where the mesh is built
+    with np.errstate(all="ignore"):  # values that are not finite are noted where the mesh is built
         vertices, faces, normals = moved(matrix, raw.vertices, raw.faces, raw.normals)
         tangents = moved_tangents(matrix, raw.tangents)
     return replace(raw, vertices=vertices, faces=faces, normals=normals, tangents=tangents)

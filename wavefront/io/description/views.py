@@ -1,4 +1,4 @@
-"""Where cameras stand, and what they see: matrices, poses and angles of view."""
+"""Views of cameras: matrices, poses and angles of view."""
 
 from __future__ import annotations
 

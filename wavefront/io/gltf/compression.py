@@ -75,7 +75,7 @@ class DracoMesh:
     item
         The extension of the primitive: the numbers of its attributes.
     budget, label
-        Where the memory is charged, and what for, for messages.
+        Where the memory is charged, and its purpose, for messages.
 
     Raises
     ------

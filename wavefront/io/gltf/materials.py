@@ -354,7 +354,7 @@ class _Reader:
             distance = self._number(group, "attenuationDistance", 1.0, high=np.inf)
             if distance == 0:
                 raise SceneError("attenuationDistance is 0; it must be above 0")
-            distance = max(distance, float(np.finfo(np.float32).tiny))  # what float32 can divide by
+            distance = max(distance, float(np.finfo(np.float32).tiny))  # not 0, as float32 divides by it
             with np.errstate(over="ignore"):
                 self._wanted["absorption"] = -log(np.maximum(color, 1e-6).astype(np.float32)) / distance
 
@@ -419,7 +419,7 @@ EXTENSIONS: dict[str, tuple[Parameter, ...]] = {
     "KHR_materials_dispersion": (Parameter("dispersion", "dispersion", 0.0, neutral=0.0, high=np.inf),),
     "KHR_materials_volume": (),
 }
-# what is read of an extension after its parameters
+# readers of extensions, after their parameters
 MORE: dict[str, Callable[[_Reader, dict[str, Any]], None]] = {
     "KHR_materials_ior": _Reader._index,
     "KHR_materials_transmission": _Reader._wall,
@@ -444,7 +444,7 @@ HARMLESS = {"KHR_xmp_json_ld", "KHR_materials_variants"}  # without effect on th
 
 
 def _check_extensions(document: Document) -> None:
-    """Note the extensions that are not read; what they give is left out, part by part."""
+    """Note the extensions that are not read; their parameters are left out."""
     required = document.items("extensionsRequired")
     for name in dict.fromkeys(map(str, (*required, *document.items("extensionsUsed")))):
         if name not in KNOWN and name not in HARMLESS:

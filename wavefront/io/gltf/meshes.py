@@ -145,7 +145,7 @@ class _Reader:
         return None
 
     def _bend(self) -> Bend:
-        """Return the morph targets and the joints; what is damaged is noted, and without effect."""
+        """Return the morph targets and the joints; damaged ones are noted, and have no effect."""
         bend, document = Bend(), self._document
         if "targets" not in self._json and "JOINTS_0" not in self._attributes:
             return bend

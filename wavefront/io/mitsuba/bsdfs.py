@@ -246,7 +246,7 @@ def _index_of_reflectance(entity: Entity) -> dict[str, Any]:
     return {"ior": float((1 + root) / (1 - root))}
 
 
-# what a parameter, with others, becomes in a way of its own
+# arguments that follow from a parameter together with others
 OTHERS: dict[str, Callable[[Entity], dict[str, Any]]] = {
     "int_ior": _relative_index,
     "distribution": _facets,

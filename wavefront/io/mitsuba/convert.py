@@ -35,7 +35,7 @@ def convert(
     Parameters
     ----------
     name
-        What it is called in messages.
+        Its name, for messages.
     scene
         The dictionary, as for `mi.load_dict`.
     files
@@ -45,7 +45,7 @@ def convert(
     read_mesh
         Returns the meshes of an obj or ply file.
     version
-        What is said of the version of its file where something is unknown.
+        Words on the version of its file, for messages about unknown names.
 
     Raises
     ------
@@ -111,7 +111,7 @@ def _sensors(entity: Entity, entities: list[Entity]) -> list[tuple[Entity, Entit
 
 
 def _followed(entity: Entity, camera: Camera | None, measures: bool) -> dict[str, Any]:
-    """Return the settings of the integrator; what it and the camera see is told to the job."""
+    """Return the settings of the integrator; the job learns whether it and the camera see media."""
     job = entity.job
     job.eye = None if camera is None else camera.origin
     integrators = entity.children("integrator")

@@ -98,7 +98,7 @@ class Document:
     scene
         The dictionary, without elements that are damaged or unknown, which are noted.
     version
-        What is said of the version of an old file where something is unknown.
+        Words on the version of an old file, for messages about unknown names.
 
     Raises
     ------
@@ -158,7 +158,7 @@ class Document:
             self._losses.note(f"<{tag.name}> has the unknown attribute {name!r}", tag.place, done="left out")
 
     def _add(self, parent: Element, tag: Tag, file: File) -> None:
-        """Add what a child says to a plugin's dictionary."""
+        """Add the value of a child to a plugin's dictionary."""
         name = OLD_TAGS.get(tag.name.lower(), tag.name.lower()) if file.old else tag.name
         if name in OBJECTS and (name != "spectrum" or "type" in tag.attributes):
             child = self._object(tag, file)

@@ -61,11 +61,11 @@ class Graph:
     Parameters
     ----------
     name
-        What the dictionary is called in messages.
+        Name of the dictionary, for messages.
     job
         The conversion of its plugins.
     version
-        What is said of the version of its file.
+        Words on the version of its file, for messages.
     """
 
     def __init__(self, name: str, job: Job, version: str = "") -> None:
@@ -183,7 +183,7 @@ class Graph:
         return self._kept[key][0]
 
     def _substitute(self, source: Mapping[str, Any]) -> Mapping[str, Any] | None:
-        """Return a plugin that keeps what it can of an unknown one."""
+        """Return the known plugin that is nearest to an unknown one; None without one."""
         children: list[Mapping[str, Any]] = [
             self._ids.get(str(value.get("id")), value) if f"{value.get('type')}" == "ref" else value
             for value in source.values()

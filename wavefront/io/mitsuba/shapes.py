@@ -298,7 +298,7 @@ def _appearance(entity: Entity, closed: bool = False, bent: bool = False) -> tup
 
 
 def _emission(entity: Entity, emitter: Entity) -> Any:
-    """Return the radiance of a shape; None if what it holds is no area light."""
+    """Return the radiance of a shape; None without an area light."""
     if emitter.type != "area" and TABLE.find("emitter", emitter.type).convert is not None:
         entity.lose(f"the emitter {emitter.type!r}, which is no area light")
         return None
@@ -329,7 +329,7 @@ def _merged(name: str, raws: list[RawMesh]) -> RawMesh:
     raw = stacked("", raws)
     if raw.normals is not None:
         return raw
-    # what is one vertex of the file is one of the mesh, whatever the materials of its faces
+    # a vertex of the file is one of the mesh, whatever the materials of its faces
     number = same_rows(raw.vertices if raw.uvs is None else np.hstack([raw.vertices, raw.uvs]))
     first = np.unique(number, return_index=True)[1]
     columns = {column: None if (rows := getattr(raw, column)) is None else rows[first] for column in COLUMNS}

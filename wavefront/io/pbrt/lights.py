@@ -243,7 +243,7 @@ def _by_longitude(pixels: Floats, to_light: Doubles) -> Floats:
 
 def _padded(pixels: Floats) -> Floats:
     """Return an equal-area image with one pixel more at each edge."""
-    # what is beyond an edge is turned about the middle of that edge
+    # pixels beyond an edge are those at it, turned about its middle
     rows = np.concatenate([pixels[:1, ::-1], pixels, pixels[-1:, ::-1]])
     return np.concatenate([rows[::-1, :1], rows, rows[::-1, -1:]], 1)
 

@@ -35,7 +35,7 @@ class Mapping:
     def at_corners(self, vertices: Doubles, faces: Ints) -> Doubles:
         """Return the coordinates of the corners of triangles, (3·m, 2): those of one triangle stay together.
 
-        What is on the axis, where a turn has no direction, gets the mean of the other corners.
+        A corner on the axis, which has no direction, gets the mean of the other corners.
         """
         assert self.coordinates is not None
         coordinates = self.coordinates(vertices)[faces]  # (m, 3, 2)

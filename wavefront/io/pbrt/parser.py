@@ -25,7 +25,7 @@ MOST = 1e100  # size of a number: the squares of larger ones overflow
 
 
 class Form(NamedTuple):
-    """What follows the name of a statement, and where it may be."""
+    """The arguments of a statement, and the places where it may stand."""
 
     follows: str  # s a string, w, v a word, n a number, m a matrix, p parameters; ? where it may be absent
     in_world: bool | None = None  # after WorldBegin, before it, or both
@@ -187,7 +187,7 @@ class _Text:
             self._skip()
 
     def _skip(self) -> None:
-        """Go on to what may be a statement."""
+        """Go on to the next word that may be a statement."""
         while True:
             try:
                 token = self._peek()

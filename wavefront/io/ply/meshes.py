@@ -1,6 +1,6 @@
 """PLY: meshes and points, with normals, texture coordinates, one texture, and colors of vertices or faces.
 
-What is damaged is left out: faces of fewer than three corners or of vertices that do not exist, and the rows
+Damaged rows are left out: faces of fewer than three corners or of vertices that do not exist, and the rows
 that a file lacks which ends early. The rows are read here, as trimesh refuses a binary file that ends early
 or whose polygons have several sizes, or a text with a damaged vertex, and leaves out strips.
 """

@@ -36,7 +36,7 @@ class Look:
     colors: ColorMap | None = None  # in place of those of the coloring
     plain: bool = False  # without scalars and colors
     rgb: bool = False  # three or four numbers are colors
-    material: Material | None = None  # of what has no scalars and colors
+    material: Material | None = None  # of datasets without scalars and colors
     opacity: float = 1.0
 
 
@@ -312,7 +312,7 @@ def _array(data: Any, look: Look) -> Any:
 
 
 def _of_cells(data: Any, look: Look) -> bool:
-    """Return whether what is shown belongs to cells."""
+    """Return whether the array that is shown belongs to cells."""
     name = _name(data, look)
     if name is None:
         return point_colors(data.point_data) is None

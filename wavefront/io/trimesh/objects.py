@@ -21,7 +21,7 @@ from ..trimesh_materials import is_blank, material_spec
 if TYPE_CHECKING:
     import trimesh
 
-# objects of trimesh without faces, and what makes shapes of them
+# objects of trimesh without faces, and the functions that make shapes of them
 WITHOUT_FACES = {"PointCloud": "Points", "Path2D": "Edges", "Path3D": "Edges"}
 Z_UP = ("stl", "stl_ascii", "3mf")  # formats with z up
 FLAT = ("glb", "gltf")  # formats in which meshes without normals have flat facets

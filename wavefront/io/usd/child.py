@@ -34,7 +34,7 @@ COMMAND = "from wavefront.io.usd.child import serve; serve()"
 IDLE = 60.0  # seconds without a request after which the process ends
 GRACE = 10  # seconds beyond its limit after which a process ends whose parent does not end it
 RESERVED = 2**28  # bytes of memory that usd-core may take for any file
-FRAME = struct.Struct("<Q")  # the length of what follows
+FRAME = struct.Struct("<Q")  # the length of the message that follows
 # each thread of usd-core reserves addresses, which count as memory
 QUIET = {"PXR_WORK_THREAD_LIMIT": "4", "MALLOC_ARENA_MAX": "2", "OPENBLAS_NUM_THREADS": "1"}
 
@@ -160,7 +160,7 @@ def serve() -> None:
     for number in SIGNALS:
         signal.signal(number, signal.SIG_DFL if number == signal.SIGTERM else signal.SIG_IGN)
     replies = os.fdopen(os.dup(1), "wb")
-    os.dup2(2, 1)  # what usd-core says is no reply
+    os.dup2(2, 1)  # lines of usd-core are no reply
     requests: queue.SimpleQueue[bytes] = queue.SimpleQueue()
     threading.Thread(target=_listen, args=(requests,), daemon=True).start()
     with suppress(queue.Empty, OSError):
@@ -180,7 +180,7 @@ def _listen(requests: queue.SimpleQueue[bytes]) -> None:
 
 @contextmanager
 def limited_memory(budget: Budget) -> Iterator[None]:
-    """Limit the memory of this process to what it has now and a budget, where the system can (Linux)."""
+    """Limit the memory of this process to its present one and a budget, where the system can (Linux)."""
     if resource is None:
         yield
         return
@@ -207,7 +207,7 @@ def allow_memory(size: int) -> None:
 
 
 def _answered(request: bytes) -> bytes:
-    """Return whether a function succeeds, and what it returns or raises."""
+    """Return whether a function succeeds, and its result or error."""
     folder, seconds, function, arguments = pickle.loads(request)
     if hasattr(signal, "alarm"):
         signal.alarm(seconds)

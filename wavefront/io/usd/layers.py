@@ -26,7 +26,7 @@ VARIABLE = re.compile(r"\$\{\w+\}")
 class Layers:
     """All layers that the stage of a file may open, which are open from now on.
 
-    What refers to a file that may not be read, or is missing, is taken out of the layer in memory.
+    References to files that may not be read, or are missing, are taken out of the layer in memory.
 
     Parameters
     ----------
@@ -66,7 +66,7 @@ class Layers:
         return layer
 
     def _check(self, layer: Any) -> None:
-        """Take out of a layer what refers to files that may not be read, and have all others opened."""
+        """Take references to files that may not be read out of a layer, and have all others opened."""
         from pxr import UsdUtils
 
         self._variables = {**layer.expressionVariables, **self._variables}
@@ -99,7 +99,7 @@ class Layers:
         return path if result.errors else str(result.value)
 
     def _packed(self, layer: Any, path: str) -> str:
-        """Return the path of what is in the same archive as the layer that refers to it, "" if it is not."""
+        """Return the path of a file in the archive of the layer that refers to it, "" if it is elsewhere."""
         from pxr import Ar, Sdf
 
         anchored = Sdf.ComputeAssetPathRelativeToLayer(layer, path)

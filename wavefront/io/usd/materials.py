@@ -54,7 +54,7 @@ PURPOSES = ("preview", "full")  # of a material; one that is bound for all comes
 MOST_MOVES = 16  # transforms of texture coordinates one after the other
 # the fields of a mesh that primvars become, by their readers
 COORDINATES, COLORS = ("uvs", "uvs1"), ("colors",)
-UNCOLORED = 0.5  # of what has an opacity alone
+UNCOLORED = 0.5  # of prims with an opacity alone
 OPACITY = "opacity"  # no field, but the fourth column of the colors
 
 

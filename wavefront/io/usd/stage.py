@@ -91,7 +91,7 @@ def _in_child(name: str, search_paths: tuple[Path, ...], limits: LoadLimits, tim
 
 @contextmanager
 def _heard(losses: Losses) -> Iterator[None]:
-    """Note what usd-core writes to the standard error, but errors of composition, which the stage has."""
+    """Note the messages of usd-core, but for errors of composition, which the stage has."""
     from pxr import UsdUtils
 
     delegate = UsdUtils.CoalescingDiagnosticDelegate()
@@ -115,7 +115,7 @@ def _read(files: SceneFiles, time: float | None) -> Contents:
 
 @dataclass
 class _Prototype:
-    """What an instancer places."""
+    """A prototype of an instancer, with its places."""
 
     prim: Any
     matrices: Matrix  # (n, 4, 4) relative to the instancer
@@ -168,7 +168,7 @@ class _Reader:
         self.camera: Camera | None = None
 
     def lose(self, prim: Any, what: str, done: str = NOT_HONORED) -> None:
-        """Note what is not honored, or left out."""
+        """Note something that is not honored, or left out."""
         self.files.losses.note(what, str(prim.GetPath()), done=done)
 
     @contextmanager
@@ -409,7 +409,7 @@ class _Reader:
         """Return the numbers of the meshes of a prim, one for each material; instances share them.
 
         Each is before the prim to which its material is bound. Instances of one prototype may have several
-        materials, by what is bound above them. `without` is as of `Meshes.of`.
+        materials, by those that are bound above them. `without` is as of `Meshes.of`.
         """
         path = prim.GetPrimInPrototype().GetPath() if prim.IsInstanceProxy() else prim.GetPath()
         key = path, id(self.materials.of(prim)), without

@@ -38,7 +38,7 @@ def has_own(prim: Any, name: str) -> bool:
 def grouped(
     prim: Any, time: Any, count: int, shown: Ints, lose: Callable[..., None]
 ) -> list[tuple[Tint, Ints]]:
-    """Return the instances of an instancer that look alike: what they have, and their numbers.
+    """Return groups of instances of an instancer that look alike: their tint, and their numbers.
 
     Parameters
     ----------

@@ -16,7 +16,7 @@ LEFT_OUT = "left out"
 
 
 class Kind(Enum):
-    """What stands after a keyword."""
+    """The kind of value of a keyword."""
 
     NUMBER = "a number"
     COLOR = "a color"
@@ -27,7 +27,7 @@ class Kind(Enum):
 
 
 class Keyword(NamedTuple):
-    """What stands after a keyword."""
+    """A keyword: the kind and the range of its value."""
 
     kind: Kind
     high: float = 1.0  # the greatest value of a color or a part; the least one is 0
