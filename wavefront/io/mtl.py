@@ -76,8 +76,8 @@ def _names(files: SceneFiles, line: str) -> list[str]:
     line = line.strip('"')
     joined = os.path.join(os.path.dirname(files.name), line)
     names = re.split(r"(?<=\.mtl)\s+", line.strip(), flags=re.IGNORECASE)  # in linear time
-    several = [name for name in names if name.lower().endswith(".mtl")]
-    return several if len(several) > 1 and not os.path.exists(joined) else [line]
+    files_named = [name for name in names if name.lower().endswith(".mtl")]
+    return files_named if len(files_named) > 1 and not os.path.exists(joined) else [line]
 
 
 def parse(

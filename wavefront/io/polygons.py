@@ -158,8 +158,8 @@ def _broken(points: Doubles, corners: Ints, counts: Ints, polygons: Ints) -> Tri
     sound: Bools = np.all(np.abs(points) <= FLOAT32_MAX, axis=1)  # false for NaN
     bad = np.flatnonzero(~sound[corners])
     polygon, first = np.unique(np.repeat(np.arange(len(counts)), counts)[bad], return_index=True)
-    several = np.isin(polygon, polygons)
-    return Triangles(np.repeat(bad[first[several]], 3).reshape(-1, 3), polygon[several])
+    is_wanted = np.isin(polygon, polygons)
+    return Triangles(np.repeat(bad[first[is_wanted]], 3).reshape(-1, 3), polygon[is_wanted])
 
 
 def _cut(points: Doubles, corners: Ints, counts: Ints, normal: Doubles, concave: Ints) -> Triangles:

@@ -94,8 +94,8 @@ def _pbr(material: Any) -> MaterialSpec:
     )
     built, lost = build_material(wanted, _normal_map(material))
     occluded = ["occlusionTexture"] if material.occlusionTexture is not None else []
-    both = bool(material.doubleSided)
-    return MaterialSpec(built, _radiance(material, texture), both, occluded + lost, alpha, cutoff)
+    two_sided = bool(material.doubleSided)
+    return MaterialSpec(built, _radiance(material, texture), two_sided, occluded + lost, alpha, cutoff)
 
 
 def _radiance(material: Any, texture: _Textures) -> Any:

@@ -277,7 +277,7 @@ def daylight_coefficients(
     wave = max(256, WAVE_VALUES // (3 * len(patches)))
     bounds = [count * batch // BATCHES for batch in range(BATCHES + 1)]
     fixed = {"wave_size": wave, "reuse": False, **settings, "up": AUTO, "aovs": ("light_groups",)}
-    both = [
+    coefficients = [
         np.stack(
             [
                 _on_patches(subject, places, {**fixed, **bounces, "samples": range(*samples)}, len(patches))
@@ -286,7 +286,7 @@ def daylight_coefficients(
         )
         for bounces in ({}, {"max_bounces": 0})
     ]
-    return DaylightCoefficients(subject, sensors.points, sensors.directions, patches, *both)
+    return DaylightCoefficients(subject, sensors.points, sensors.directions, patches, *coefficients)
 
 
 def _on_patches(scene: Scene, sensors: Sensors, settings: dict[str, Any], patches: int) -> Doubles:

@@ -91,10 +91,10 @@ def measure_flux(
 
 def _chosen(scene: Scene, shapes: Any) -> list[Shape]:
     """Return shapes that are given by themselves or by names."""
-    several: Sequence[Any] = [shapes] if isinstance(shapes, str | Shape) else list(shapes)
+    elements: Sequence[Any] = [shapes] if isinstance(shapes, str | Shape) else list(shapes)
     names = {shape.name for shape in scene.shapes}
     chosen: list[Shape] = []
-    for element in several:
+    for element in elements:
         if isinstance(element, str):
             one_of("shapes: name", element, tuple(names))
             chosen += [shape for shape in scene.shapes if shape.name == element]

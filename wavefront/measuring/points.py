@@ -45,12 +45,12 @@ def grid_points(
         finite_array(f"grid_points: {name}", value, (3,))
         for name, value in (("corner", corner), ("edge_u", edge_u), ("edge_v", edge_v))
     )
-    both = tuple(counts) if isinstance(counts, list | tuple | np.ndarray) else (counts, counts)
-    if len(both) != 2:
+    pair = tuple(counts) if isinstance(counts, list | tuple | np.ndarray) else (counts, counts)
+    if len(pair) != 2:
         raise SceneError(
             f"grid_points: counts is {in_brief(counts)}; it must be two whole numbers, or one for both"
         )
-    many, rows = (whole_number(1, MOST)("grid_points: counts", count) for count in both)
+    many, rows = (whole_number(1, MOST)("grid_points: counts", count) for count in pair)
     normal = np.cross(u, v)
     length = np.linalg.norm(normal)
     if not length > 0:

@@ -65,9 +65,9 @@ class Weather:
         shape = self.direct_normal.shape
         self.diffuse_horizontal = finite_array("diffuse_horizontal", diffuse_horizontal, (None,))
         if self.diffuse_horizontal.shape != shape:
-            both = f"{len(self.direct_normal)} and {len(self.diffuse_horizontal)}"
+            hours = f"{len(self.direct_normal)} and {len(self.diffuse_horizontal)}"
             raise SceneError(
-                f"direct_normal and diffuse_horizontal have {both} hours; they must have as many"
+                f"direct_normal and diffuse_horizontal have {hours} hours; they must have as many"
             )
         towards = finite_array("sun", sun, (*shape, 3))
         for name, values in (

@@ -178,8 +178,8 @@ class _Reader:
         if radiance is not None:
             material.efficacy = OF_CANDELA
         material.name = printable(str(self._json["name"])) if self._json.get("name") else None
-        both = bool(self._json.get("doubleSided"))
-        return MaterialSpec(material, radiance, both, self._lost + lost, self._alpha_given, self._cutoff)
+        two_sided = bool(self._json.get("doubleSided"))
+        return MaterialSpec(material, radiance, two_sided, self._lost + lost, self._alpha_given, self._cutoff)
 
     def _extended(self, extensions: dict[str, Any]) -> None:
         """Read the extensions of metallic-roughness."""

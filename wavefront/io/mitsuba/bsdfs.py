@@ -227,14 +227,14 @@ def _relative_index(entity: Entity) -> dict[str, Any]:
 
 def _facets(entity: Entity) -> dict[str, Any]:
     """Return the parameters of microfacets."""
-    both = "plastic" not in entity.type and bool({"alpha_u", "alpha_v"} & entity.values.keys())
+    anisotropic = "plastic" not in entity.type and bool({"alpha_u", "alpha_v"} & entity.values.keys())
     facets: dict[str, Any] = {
-        "roughness": roughness(entity, "alpha_u" if both else "alpha", 0.1),
+        "roughness": roughness(entity, "alpha_u" if anisotropic else "alpha", 0.1),
         "distribution": entity.choice("distribution", "beckmann", ("beckmann", "ggx")),
         "shadowing": "separable",
         "multiscatter": False,
     }
-    return facets | ({"roughness_v": roughness(entity, "alpha_v", 0.1)} if both else {})
+    return facets | ({"roughness_v": roughness(entity, "alpha_v", 0.1)} if anisotropic else {})
 
 
 def _index_of_reflectance(entity: Entity) -> dict[str, Any]:

@@ -353,10 +353,10 @@ def _box(matrix: Matrix) -> tuple[Doubles, Doubles]:
 
 def _for_spheres(material: Material, emission: Any, job: Job) -> tuple[Material, Any]:
     """Return both with their textures upside down: v of a `Sphere` is 1 where Mitsuba's is 0."""
-    both = (material, emission)
-    key = (*map(id, both), "sphere")
+    appearance = (material, emission)
+    key = (*map(id, appearance), "sphere")
     if key not in job.made:
-        memo = {id(texture): upside_down(texture) for texture in textures_in(both, Texture)}
-        job.made[key] = (deepcopy(both, {**memo, **{id(memo): list(memo.values())}}), both)
+        memo = {id(texture): upside_down(texture) for texture in textures_in(appearance, Texture)}
+        job.made[key] = (deepcopy(appearance, {**memo, **{id(memo): list(memo.values())}}), appearance)
     converted: tuple[Material, Any] = job.made[key][0]
     return converted

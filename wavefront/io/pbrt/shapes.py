@@ -260,11 +260,11 @@ def _emission(light: Entity | None, area: float) -> tuple[Any, bool]:
     emission = None if light is None else light.job.convert(light)
     if light is None or emission is None:
         return None, False
-    radiance, luminance, both = emission
+    radiance, luminance, two_sided = emission
     power = light.number("power", -1.0)
     if power > 0 and luminance > 0 and area > 0:
-        radiance = computed(product, radiance, power / (luminance * area * np.pi * (2 if both else 1)))
-    return radiance, both
+        radiance = computed(product, radiance, power / (luminance * area * np.pi * (2 if two_sided else 1)))
+    return radiance, two_sided
 
 
 def _area(raw: RawMesh) -> float:
