@@ -1,6 +1,6 @@
 """The program of a compiled scene: its features, each bound to the points between stages where it acts.
 
-A feature is what few scenes have, such as a background or absorption. It is one file in features/: a class
+A feature is a rare property of scenes, such as a background or absorption. It is one file in features/: a class
 that says when a scene has it, and overrides the points where it acts. Each kind of feature is asked once,
 when a scene is compiled. Stages then go through tuples of the features that act at a point: a scene
 without features pays for none, and no stage asks for absent ones.
@@ -37,8 +37,8 @@ class Facts:
     corners: Floats  # (m, 3, 3) of the triangles, as they are in the arrays
     has_alpha: Bools  # (m + k + 1,) primitives whose opacity is below 1
     asked: Mapping[str, Any]  # settings, by their names
-    given: Sequence[Feature]  # of the user's own
-    found: list[Feature]  # those that the scene has, of those before in the order
+    user_features: Sequence[Feature]
+    features: list[Feature]  # those that the scene has, so far in the order
 
 
 @soa
@@ -271,8 +271,8 @@ class Program:
         for kind in kinds:
             feature = kind.of(facts)
             if feature is not None:
-                facts.found.append(feature)
-        return cls([*facts.found, *facts.given])
+                facts.features.append(feature)
+        return cls([*facts.features, *facts.user_features])
 
     def leg(self, bounce: int) -> LegProgram:
         """Return the program of the leg that ends at a bounce."""

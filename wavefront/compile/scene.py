@@ -294,6 +294,6 @@ def gather_scene(
         corners=triangles,
         has_alpha=has_alpha,
         asked=asked,
-        given=asked.get("features", ()),
-        found=[],
+        user_features=asked.get("features", ()),
+        features=[],
     )

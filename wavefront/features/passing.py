@@ -16,7 +16,7 @@ class Passing(Feature):
     @classmethod
     def of(cls, facts: Facts) -> Self | None:
         """Return the feature of a scene with surfaces that rays may pass, or with media."""
-        some = [*facts.found, *facts.given]
+        some = [*facts.features, *facts.user_features]
         needed = any(acts(feature, point) for feature in some for point in ("passable", "walk"))
         return cls() if needed else None
 
