@@ -66,7 +66,7 @@ class BruteForceTriangles:
     table
         Of all triangles.
     polygons
-        What is tested.
+        Those to test, by kind: triangles and quadrilaterals.
     partner
         (primitives + 1,) second triangle of the quadrilateral whose first triangle this is, -1 for none.
     diagonal

@@ -29,7 +29,7 @@ class Clamp:
         """Return light `arriving` (3, k) at slots (k,), its indirect part scaled down to the limit.
 
         A path of several branches is the `share` of a sample, and is clamped like one of a sample of its own.
-        What is not finite stays so.
+        Values that are not finite stay so.
         """
         assert paths.depth is not None
         limit, (x, y, z) = f4(self.limit * share), arriving * f4(1 / 3)

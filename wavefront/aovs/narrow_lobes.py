@@ -2,7 +2,7 @@
 
 Where a path leaves a rough surface and then, by a delta lobe or a very narrow one, meets a lamp, no light
 sample could have found that light. Such paths may be so rare that no sample of a sensor has met one, and then
-neither the mean nor its scatter tell of them. What is known is how often paths have left such lobes, and with
+neither the mean nor its scatter tell of them. It is known only how often paths have left such lobes, and with
 which throughput p: as much light as p times the radiance of the brightest emitter may have been missed.
 
 Only sensors in scenes with such lobes and such emitters have the record: `narrow_aovs`.

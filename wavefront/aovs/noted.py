@@ -13,7 +13,7 @@ from ..film.aov_names import NOTED
 
 
 class Noted:
-    """What is noted about n samples, (3, n) for each AOV.
+    """Notes about n samples, (3, n) for each AOV.
 
     Parameters
     ----------

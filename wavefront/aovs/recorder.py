@@ -1,4 +1,4 @@
-"""The recorder of a wave: takes from the stages what the sampled AOVs of its samples need.
+"""The recorder of a wave: takes the data for the sampled AOVs of its samples from the stages.
 
 A recorder travels with the paths (`Paths.recorder`), so integrators need not know which AOVs are asked for,
 and integrators of a user's own give the same AOVs if they are made of the same stages.
@@ -54,7 +54,7 @@ class SampleRecorder(PathRecorder):
     wanted
         The AOVs that are asked for.
     scene
-        What is rendered.
+        The scene to render.
     n
         Samples of the wave: slots of its paths.
     clamp
@@ -245,7 +245,7 @@ class SampleRecorder(PathRecorder):
         Parameters
         ----------
         integrator
-            What has traced the paths.
+            The integrator that has traced the paths.
         radiance
             (3, n) that it returned.
 

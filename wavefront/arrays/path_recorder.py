@@ -1,4 +1,4 @@
-"""What travels with paths and looks on: the base of recorders."""
+"""The base of recorders, which travel with paths and look on."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ if TYPE_CHECKING:
 class PathRecorder:
     """Is told of each step of the paths that carry it (`Paths.recorder`), whatever their integrator.
 
-    Each method does nothing by itself. What is shaded is a `Shading`.
+    Each method does nothing by itself. Surfaces that are shaded are a `Shading`.
 
     Attributes
     ----------

@@ -1,4 +1,4 @@
-"""What the stages pass on: structures of arrays with one column per path.
+"""The data that stages pass on: structures of arrays with one column per path.
 
 Each field is declared once, with its shape and unit; `take`, `concatenate` and `len` are derived.
 """

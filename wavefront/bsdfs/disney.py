@@ -17,7 +17,7 @@ from .rough import Tangent
 
 @parametrized
 class DisneyModel(LayeredBsdf):
-    """What Disney's materials for solids and for thin sheets have in common."""
+    """The common base of Disney's materials for solids and for thin sheets."""
 
     base_color: Parameter[Color] = Parameter(color, default=0.5)
     roughness: Parameter[Scalar] = Parameter(scalar, default=0.5)

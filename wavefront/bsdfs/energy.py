@@ -60,7 +60,7 @@ Place: TypeAlias = tuple[Floats | None, Floats]  # row, in a table of two roughn
 
 
 class Shape(NamedTuple):
-    """What tables depend on, beside an index of refraction."""
+    """The parameters of tables, beside an index of refraction."""
 
     alpha: float | None  # None: all roughnesses, for textures
     alpha_v: float | None  # the same across, if it is brushed

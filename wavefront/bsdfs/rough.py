@@ -55,7 +55,7 @@ class Tangent(BaseTexture):
 
 
 class MicrofacetSurface:
-    """What consists of microfacets."""
+    """A surface of microfacets."""
 
     roughness: Any
     roughness_v: Any = None

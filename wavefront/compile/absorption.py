@@ -52,7 +52,7 @@ def absorbs_alone(shapes: Sequence[Shape], lights: Sequence[Light], scale: float
     Parameters
     ----------
     shapes
-        What is traced.
+        The shapes that are traced.
     lights
         Those of the scene, in its own unit: of `scale`, lengths are multiplied by it for the shapes.
     """

@@ -72,11 +72,11 @@ def gather_lights(
     Parameters
     ----------
     scene
-        What is rendered.
+        The scene to render.
     scaled, scale
         Its shapes with all lengths multiplied by `scale`, in the same order.
     meshes, curved, vertices
-        What is traced, and the vertices (n, 3) of each mesh, relative to `center` (3,).
+        The shapes that are traced, and the vertices (n, 3) of each mesh, relative to `center` (3,).
     half_size
         Half of the scene's extent, (3,).
     choice, mis
@@ -84,7 +84,7 @@ def gather_lights(
     glowing
         The lights of media; they are the last ones before those at infinity, in the default group.
     motion
-        What moves while a shutter is open.
+        The shapes that move while a shutter is open.
     light_motions
         How lights move, and which does how, by their numbers.
 

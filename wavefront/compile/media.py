@@ -235,9 +235,9 @@ def media_table(
     around
         The medium of the scene.
     shapes, materials
-        What is rendered.
+        Those of the scene.
     media
-        What `media_of` has returned.
+        The result of `media_of`.
     center
         (3,) of the scene.
     """

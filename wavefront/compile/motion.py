@@ -1,8 +1,8 @@
 """Shapes and lights that move while a shutter is open, and their places at the time of a path.
 
-The arrays of a compiled scene hold it as it is in the middle of that time. What moves is an instance in them:
-each ray meets it by the matrix of its own time. A mesh that deforms has its corners at several times, as an
-instance that follows its middle.
+The arrays of a compiled scene hold it as it is in the middle of that time. Moving shapes are instances in
+them: each ray meets these by the matrix of its own time. A mesh that deforms has its corners at several
+times, as an instance that follows its middle.
 """
 
 from __future__ import annotations

@@ -1,8 +1,8 @@
 """The program of a compiled scene: its features, each bound to the points between stages where it acts.
 
-A feature is a rare property of scenes, such as a background or absorption. It is one file in features/: a class
-that says when a scene has it, and overrides the points where it acts. Each kind of feature is asked once,
-when a scene is compiled. Stages then go through tuples of the features that act at a point: a scene
+A feature is a rare property of scenes, such as a background or absorption. It is one file in features/: a
+class that says when a scene has it, and overrides the points where it acts. Each kind of feature is asked
+once, when a scene is compiled. Stages then go through tuples of the features that act at a point: a scene
 without features pays for none, and no stage asks for absent ones.
 """
 

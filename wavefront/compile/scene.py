@@ -136,7 +136,7 @@ def gather_scene(
     Parameters
     ----------
     scene
-        What to render.
+        The scene to render.
     make_accelerator
         Called with the `Geometry`; returns the `Accelerator`.
     light_sampler

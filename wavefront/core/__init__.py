@@ -1,1 +1,1 @@
-"""What every package uses: errors, tables of names, files, memory, progress, fingerprints."""
+"""The base of every package: errors, tables of names, files, memory, progress, fingerprints."""

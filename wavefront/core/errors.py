@@ -55,7 +55,7 @@ class SceneError(ValueError):
 
 
 class LimitError(SceneError):
-    """What a limit does not allow, such as one of `LoadLimits`: no part of a file is left out for it."""
+    """A limit is exceeded, such as one of `LoadLimits`: no part of a file is left out for it."""
 
 
 def passed_limit(error: BaseException | None) -> bool:

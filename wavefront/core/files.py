@@ -60,7 +60,7 @@ def check_regular(path: str | os.PathLike[str], limit: float = math.inf) -> None
 def decode_text(data: bytes) -> str:
     """Return text from UTF-8 or UTF-16 (by its byte order mark), else Latin-1.
 
-    Line ends become \\n. What ends a file of DOS, Ctrl-Z and zeros, is left out.
+    Line ends become \\n. The end of a file of DOS, Ctrl-Z and zeros, is left out.
     """
     if data.startswith((b"\xff\xfe", b"\xfe\xff")):
         text = data.decode("utf-16", errors="replace")

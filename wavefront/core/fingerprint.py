@@ -51,7 +51,7 @@ def fingerprint(what: str, thing: Any) -> str:
     Parameters
     ----------
     what
-        What the message of an error calls the thing.
+        Name of the object in the message of an error.
     thing
         Anything.
 

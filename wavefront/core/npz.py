@@ -31,7 +31,7 @@ DAMAGED = "is damaged: delete it, or restore it from a copy"
 
 
 class _Parts(list[Any]):
-    """What was written, in parts that are not copied."""
+    """A file in memory: the parts that were written, which are not copied."""
 
     def write(self, data: Any) -> int:
         self.append(data)

@@ -29,7 +29,7 @@ class Bar:
     end
         How the render ends if the number of samples is not known before. A bar shows it in place of a total.
     unit
-        What is counted, if not samples.
+        The unit that is counted, if not samples.
     """
 
     def __init__(
@@ -126,7 +126,7 @@ def phase(title: str, progress: Progress = None) -> Iterator[None]:
     Parameters
     ----------
     title
-        What is being done, such as "loading bunny.obj".
+        The work, such as "loading bunny.obj".
     progress
         True or None shows the line. False shows none, and neither does a function, which counts samples.
     """

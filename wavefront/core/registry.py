@@ -25,7 +25,7 @@ class Registry(Mapping[str, T], Generic[T]):
     setting
         The name of the setting, for messages.
     expected
-        What an object of this kind is, for messages.
+        Name of the kind of object, for messages.
     entries
         The built-in ones, by name.
     accepts
@@ -87,7 +87,7 @@ class Registry(Mapping[str, T], Generic[T]):
         value
             A name in the table, or an object of this kind.
         setting
-            What the message calls the setting, in place of the table's own word.
+            Name of the setting in messages, in place of the table's own word.
 
         Raises
         ------

@@ -32,7 +32,7 @@ def did_you_mean(name: object, known: Iterable[str], places: Iterable[str] = ())
     Parameters
     ----------
     name
-        What was looked for.
+        The unknown name.
     known
         The names that there are.
     places
@@ -68,7 +68,7 @@ def _misspelled(word: str, plain: dict[str, str]) -> str | None:
 
 
 def _is_name(answer: str) -> bool:
-    """Return whether an answer is a name, also one of two words, and not text to write."""
+    """Return whether an answer is a name, perhaps of two words, and not text to write."""
     return answer.replace(" ", "_").isidentifier()
 
 

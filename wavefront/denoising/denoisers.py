@@ -41,7 +41,7 @@ def denoise(picture: NoisyPicture, denoiser: str = "auto") -> tuple[Floats, str]
     Parameters
     ----------
     picture
-        What to denoise.
+        The picture to denoise.
     denoiser
         A name of `DENOISERS`, or "auto": "oidn" where pyoidn is installed, else "nonlocal_means".
 

@@ -1,4 +1,4 @@
-"""What denoisers are given: a noisy picture and its guides."""
+"""The input of denoisers: a noisy picture and its guides."""
 
 from __future__ import annotations
 

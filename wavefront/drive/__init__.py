@@ -1,4 +1,4 @@
-"""What drives a render: the session, the picture, the work, and the choices that are made for them."""
+"""The drive of a render: the session, the picture, the work, and the choices that are made for them."""
 
 from .program import program
 from .session import Session

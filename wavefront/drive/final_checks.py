@@ -1,4 +1,4 @@
-"""What a render ends with: errors that have the picture so far, and warnings about the picture."""
+"""The end of a render: errors that have the picture so far, and warnings about the picture."""
 
 from __future__ import annotations
 

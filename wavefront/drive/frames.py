@@ -48,9 +48,9 @@ def render_frames(  # type: ignore[misc]  # its shutter is a part of a frame
     """Render a scene at several times, one after the other.
 
     Without a shutter each image is that of `render(source.at(time))` with the same settings, bit for bit:
-    also its seed is the same one for all frames. What stands still is built once. With an `executor` of your
-    own, such as a client of Dask or an executor of mpi4py, whole frames are its jobs, and the scene is sent
-    to each worker once.
+    also its seed is the same one for all frames. Still parts of the scene are built once. With an `executor`
+    of your own, such as a client of Dask or an executor of mpi4py, whole frames are its jobs, and the
+    scene is sent to each worker once.
 
     Parameters
     ----------

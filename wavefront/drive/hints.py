@@ -1,4 +1,4 @@
-"""What may help a render: in its metadata, and in a line each at its end where it took long."""
+"""Hints for a render: in its metadata, and in a line each at its end where it took long."""
 
 from __future__ import annotations
 
@@ -111,7 +111,7 @@ class Hints:
     Parameters
     ----------
     settings, prepared
-        What is rendered.
+        Of the session.
     """
 
     def __init__(self, settings: Settings, prepared: PreparedScene) -> None:

@@ -21,7 +21,7 @@ class InlineWorker:
     work
         Turns a monitor and a job into a result.
     monitor
-        What the session watches and stops jobs by.
+        The monitor by which the session watches and stops jobs.
     """
 
     def __init__(self, work: Callable[[WaveMonitor, Any], Any], monitor: WaveMonitor) -> None:

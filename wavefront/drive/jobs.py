@@ -1,4 +1,4 @@
-"""What is traced, and when: passes of a render, their jobs, how large those are, and if there is time."""
+"""The order of tracing: passes of a render, their jobs, the sizes of jobs, and the time."""
 
 from __future__ import annotations
 
@@ -158,7 +158,7 @@ def next_stop(samples: int, least: int = MIN_SPP) -> int:
 
 @soa
 class CameraJob:
-    """What all jobs of one picture have in common.
+    """Data that all jobs of one picture share.
 
     It travels with each job, so that workers that have been started can trace another view.
     """
@@ -268,7 +268,7 @@ class Job:
 
 @soa
 class WaveResult:
-    """What a wave of a job returns."""
+    """The result of a wave of a job."""
 
     radiance: Floats  # (3, samples, pixels)
     bad: Ints  # lanes whose radiance was not finite; it is 0 there

@@ -60,7 +60,7 @@ class Picture:
     plan
         How it is rendered.
     camera
-        What sees the scene.
+        The camera of the picture.
     sums
         Those of no samples; `make_budget` checks before that there is memory for them.
     begin
@@ -77,7 +77,7 @@ class Picture:
     scheduler
         Sizes the jobs and keeps the time.
     view
-        What all jobs have in common.
+        The data that all jobs share.
     step
         The pass under way; None before the first one.
     file

@@ -65,7 +65,7 @@ def _bytes_of_sums(layers: tuple[str, ...], light_tracing: bool) -> int:
 
 @soa
 class Budget:
-    """What is traced at once."""
+    """The number of paths that are traced at once."""
 
     workers: int
     wave_size: int  # lanes of the largest wave

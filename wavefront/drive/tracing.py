@@ -34,7 +34,7 @@ FIRST_SAMPLE_TIMEOUT = 3.0  # seconds that a wave of first samples may take even
 
 
 class WaveMonitor:
-    """What all workers share.
+    """Data that all workers share.
 
     Attributes
     ----------

@@ -29,7 +29,7 @@ class Work:
     pool
         Traces the jobs.
     monitor
-        What workers share with the session.
+        The data that workers share with the session.
     wave_done
         Called when a job is done, and every now and then while none is.
 

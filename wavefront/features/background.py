@@ -1,4 +1,4 @@
-"""What the camera sees where its rays miss everything: a background, or the backdrop of an environment."""
+"""Pixels whose rays miss everything: they show a background, or the backdrop of an environment."""
 
 from __future__ import annotations
 

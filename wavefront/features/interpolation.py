@@ -1,4 +1,4 @@
-"""What is interpolated over triangles or computed on curved shapes: normals of vertices, and attributes."""
+"""Data that are interpolated over triangles or computed on curved shapes: normals, and attributes."""
 
 from __future__ import annotations
 

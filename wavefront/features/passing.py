@@ -1,4 +1,4 @@
-"""What takes paths on behind surfaces that they pass, and through media: see stages/passing.py."""
+"""The way of paths behind surfaces that they pass, and through media: see stages/passing.py."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What lights shine on: image lights are sampled by the directions that surfaces face."""
+"""Receivers of light: image lights are sampled by the directions that surfaces face."""
 
 from __future__ import annotations
 

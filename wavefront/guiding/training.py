@@ -32,7 +32,7 @@ SHARE_PRIOR = 200.0  # records that the comparison over all cells counts for
 
 @soa
 class Records(SoA):
-    """What paths found, a column for each direction that one took."""
+    """The light that paths found, a column for each direction that one took."""
 
     cell: Ints  # (m,) where it left the surface
     bins: Ints  # (m,) bin of the direction

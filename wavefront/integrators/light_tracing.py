@@ -50,7 +50,7 @@ LOWER_BITS = 2.0**-24  # of a number drawn: how far apart two of them are
 
 @soa
 class Splats(SoA):
-    """What paths from lights add to pixels, which may repeat."""
+    """Light that paths from lights add to pixels, which may repeat."""
 
     path: Ints  # (k,) number of the path
     pixel: Words  # (k,) row-major index within the camera's window

@@ -47,7 +47,7 @@ class ListedStage:
 
 @dataclass(frozen=True)
 class StageList:
-    """What `wf.program` returns: print it, or go through its `stages`."""
+    """The result of `wf.program`: print it, or go through its `stages`."""
 
     integrator: str
     stages: tuple[ListedStage, ...]

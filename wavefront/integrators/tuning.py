@@ -51,7 +51,7 @@ GUIDED_RAY = 1.375  # of a ray of a guided path
 
 @soa
 class Run:
-    """What the paths of a tuning run have found."""
+    """The results of a tuning run."""
 
     scale: Doubles  # (3, pixels) squared mean around each pixel, which variances are relative to
     variance: Doubles  # (pixels,) of blocks of samples

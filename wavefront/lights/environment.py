@@ -77,7 +77,7 @@ class Environment(Parametrized, FarLight):
     group
         Name of the light group, for `aovs="light_groups"`.
     backdrop
-        What the camera sees directly in place of the light, given as `radiance` is; None shows the light.
+        The background that the camera sees in place of the light, given as `radiance` is; None: the light.
         Mirrors and glass always show the light.
 
     Attributes
@@ -85,7 +85,7 @@ class Environment(Parametrized, FarLight):
     radiance
         (3, 1) W·sr⁻¹·m⁻²; of an image, the mean over all directions.
     backdrop
-        What the camera sees directly, an `Environment`; None if that is the light itself.
+        The background that the camera sees, an `Environment`; None if that is the light itself.
 
     Notes
     -----

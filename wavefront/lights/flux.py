@@ -35,7 +35,7 @@ def with_flux(
     lumens, watts
         Luminous flux, or power as the mean of the channels. The area that emits is in square scene units.
     efficacy
-        lm/W of white, as in `from_photometric`. What is given in lumens has it in `Measurement.lux`, too.
+        lm/W of white, as in `from_photometric`. Light given in lumens has it in `Measurement.lux`, too.
 
     Raises
     ------

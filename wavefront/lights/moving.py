@@ -1,6 +1,6 @@
 """Lights that move while a shutter is open: each is sampled in its place at the time of the path.
 
-What receives the light tells the time (`Receiver`). A density in solid angle is that of the light as it is
+The `Receiver` tells the time. A density in solid angle is that of the light as it is
 then, so it stays exact.
 """
 

@@ -49,7 +49,7 @@ class Flight(SoA):
 
 @soa
 class GlowWeights(SoA):
-    """What weighs emission that rays meet against light samples of it (multiple importance sampling)."""
+    """Data to weigh emission that rays meet against light samples of it (multiple importance sampling)."""
 
     ratio: Floats  # (n,) chance of the light over the density of the ray's direction; 0 for no light sample
     before: (
@@ -58,7 +58,7 @@ class GlowWeights(SoA):
 
 
 class BaseMedium(Parametrized, ABC):
-    """What fills the space inside shapes, or around them: absorbs, scatters and emits light."""
+    """A medium inside shapes, or around them: it absorbs, scatters and emits light."""
 
     phase: PhaseFunction
     # (3, 1) absorption, scattering and emission per scene unit, times the scale; of a grid where its density

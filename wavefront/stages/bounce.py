@@ -17,7 +17,7 @@ from .shade import Shading
 def branch(paths: Paths, shade: Shading, sampler: Sampler, bounce: int, ways: int) -> Paths:
     """Continue each path in several ways, each with an equal part of the throughput.
 
-    What comes before is shared by all.
+    The path before is shared by all.
     """
     if ways == 1:
         return bounce_sample(paths, shade, sampler, bounce)

@@ -1,4 +1,4 @@
-"""What paths are inside of where they begin."""
+"""The media around the origins of paths."""
 
 from __future__ import annotations
 

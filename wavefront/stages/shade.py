@@ -138,7 +138,7 @@ class Shading:
             f[:, lanes], pdf[lanes] = part_f, part_pdf
         return f, pdf
 
-    # --- What features change -------------------------------------------------------------------------
+    # --- Points for features --------------------------------------------------------------------------
 
     def origins(self, cos_g: Floats) -> Floats:
         """Return where rays (3, n) start that leave with cosines (n,) against `ng`."""

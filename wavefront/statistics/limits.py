@@ -73,7 +73,7 @@ def light_limits(
     Parameters
     ----------
     event
-        What one event brings.
+        The contribution of one event.
     """
     t = _deviates(confidence, freedom)
     more, lit = EVENTS * event, np.where(mean > 0, mean, 1)

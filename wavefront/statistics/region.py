@@ -67,7 +67,7 @@ class RegionMean:
 
 @soa
 class PixelErrors:
-    """What is known of the errors of the pixels of a picture."""
+    """The errors of the pixels of a picture."""
 
     standard_error: Floats | None  # (H, W, 3) from the scatter of batches
     freedom: Doubles  # (H, W) its degrees of freedom

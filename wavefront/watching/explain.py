@@ -37,7 +37,7 @@ def explain(scene: Any, image: Image, pixel: Pixel, most: int = 3) -> list[PathV
     Parameters
     ----------
     scene
-        What was rendered.
+        The scene that was rendered.
     image
         A picture of it, from `render` with `branches=1` and `reuse=False`, not denoised.
     pixel

@@ -30,7 +30,7 @@ PATH_COLOR, LIGHT_COLOR = (0.9, 0.35, 0.05), (1.0, 0.9, 0.2)
 class LightFound:
     """Light that a path has found at a vertex.
 
-    What it adds to the pixel is `throughput` · `radiance` · `weight`, of light samples times
+    It adds to the pixel `throughput` · `radiance` · `weight`, of light samples times
     `f` · `cos` / `pdf_light`.
 
     Examples
@@ -52,7 +52,7 @@ class LightFound:
 
 @dataclass(frozen=True, slots=True)
 class Vertex:
-    """What happened where a path has come to.
+    """The events at one vertex of a path.
 
     Directions are those of the user's scene. A value is None where the path did not get so far.
 

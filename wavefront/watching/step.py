@@ -18,7 +18,7 @@ LENGTHS = ("t", "error", "dpduv", "dpduv1")  # fields that are lengths
 
 
 class Step:
-    """What a stage of the loop has left behind, from `trace`.
+    """The data after a stage of the loop, from `trace`.
 
     Its arrays are read-only. Places are in the coordinates of the user's scene.
 
@@ -36,7 +36,7 @@ class Step:
     paths
         The paths that are under way.
     hits
-        What their rays have hit; None where they have not been traced.
+        The hits of their rays; None where they have not been traced.
     surface
         The surfaces that they have come to; None where these are not known.
 
@@ -70,7 +70,7 @@ class Step:
 
     @cached_property
     def hits(self) -> Hits | None:
-        """What their rays have hit; None where they have not been traced."""
+        """The hits of their rays; None where they have not been traced."""
         return None if self._hits is None else in_world(self._scene, self._hits)
 
     @cached_property

@@ -59,7 +59,7 @@ class ProcessPool:
     stop
         The stop flag.
     work
-        What forked processes have from the beginning.
+        The work that forked processes have from the beginning.
     """
 
     replaceable = True

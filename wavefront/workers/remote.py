@@ -175,7 +175,7 @@ class Payload:
 
 @soa
 class Reply:
-    """What a worker answers to a job."""
+    """The answer of a worker to a job."""
 
     result: Any = None
     warnings: tuple[str, ...] = ()

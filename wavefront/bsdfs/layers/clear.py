@@ -22,7 +22,7 @@ TURNED_OVER = np.array([[1], [1], [-1]], f4)
 
 @soa
 class Clear:
-    """What reflects and transmits light by Fresnel's equations, in the facets of the base."""
+    """A clear part: it reflects and transmits light by Fresnel's equations, in the facets of the base."""
 
     ior: Floats  # (n,)
     thin: bool  # a sheet, which does not bend light

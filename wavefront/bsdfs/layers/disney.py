@@ -21,7 +21,7 @@ COAT_SHADOWS = Facets(np.full(1, 0.25, f4), separable=True)
 
 @dataclass(eq=False, kw_only=True)
 class DisneyBase(Base):
-    """What the bases of solids and of thin sheets have in common."""
+    """The common part of the bases of solids and of thin sheets."""
 
     base_color: Floats  # (3, n)
     roughness: Floats  # (n,)

@@ -130,7 +130,7 @@ class LayeredBsdf(JointBsdf):
         Names of the parameters that are textures, or not 0. They decide which layers there are, so that
         these are the same at all points.
     clear_again
-        What facets of clear parts scatter more than once returns.
+        With multiple scattering by the facets of clear parts.
     boundary
         Index of refraction for which tables tell how; None for sheets, or where it varies.
     """
