@@ -45,9 +45,10 @@ def pytest_configure() -> None:
     """Let programs import modules of tests, and have Ctrl-C stop this process and its children.
 
     A shell that starts the tests in the background has them ignore Ctrl-C. The garbage collector rests until
-    the tests are collected.
+    the tests are collected. Programs keep the modules that they compile, or each would compile all anew.
     """
     gc.disable()
+    os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
     paths = str(Path(__file__).parent), os.environ.get("PYTHONPATH")
     # modules of tests, for the programs that they run
     os.environ["PYTHONPATH"] = os.pathsep.join(filter(None, paths))

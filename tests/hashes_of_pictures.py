@@ -1,9 +1,13 @@
-"""Print the SHA-256 of pictures that use every elementary function; test_elementary.py runs this."""
+"""Print the SHA-256 of pictures that use every elementary function; test_elementary.py runs this.
+
+Arguments are the accelerators; all that are installed by default.
+"""
 
 from __future__ import annotations
 
 import hashlib
 import json
+import sys
 import warnings
 from collections.abc import Iterable
 from typing import Any
@@ -18,6 +22,7 @@ from wavefront.codecs.encoding import srgb_to_linear, to_codes
 warnings.simplefilter("ignore")
 choose.COPIES = 0  # instances are traced as such
 rng = np.random.default_rng(0)
+ACCELERATORS = sys.argv[1:] or (["numpy", "embree"] if installed() else ["numpy"])
 GREY = wf.Diffuse(0.6)
 FLOOR = wf.Rectangle((-3, 0, -3), (0, 0, 6), (6, 0, 0), material=GREY)
 EMITTER = wf.Rectangle((-0.5, 2, -0.5), (1, 0, 0), (0, 0, 1), emission=6)
@@ -47,7 +52,7 @@ def net(material: wf.Bsdf) -> wf.Mesh:
 
 def add(name: str, shapes: Any, lights: Iterable[Any] = (), camera: wf.Camera = CAMERA, **more: Any) -> None:
     scene = wf.Scene([FLOOR, *shapes], lights, camera)
-    for accel in ("numpy", "embree") if installed() else ("numpy",):
+    for accel in ACCELERATORS:
         image = wf.render(scene, 2, accel=accel, max_bounces=5, workers=1, progress=False, **more)
         hashes[f"{name}, {accel}"] = hashlib.sha256(image.rgb.tobytes()).hexdigest()
 

@@ -11,6 +11,8 @@ imported already, so that a mutant costs no more than the tests that it fails:
 - `factors`: a product or a quotient without one of its factors, `a *= b` or `a /= b` left out, `-a` as a.
 - `densities`: what a function named pdf or pmf returns, or what is assigned to such a name, times that; and
   all of these in one class at once, so that what is returned with a sample agrees with the function.
+- `features`: a class of features/ without one of its methods or class attributes, so that those of its base
+  class act in their place. Without `of`, no scene has the feature.
 
 The tests of a file stand in `TESTS`; they run with -x, and `--tests` names others. A test that fails kills a
 mutant. One with which the module cannot be imported, or the tests cannot be collected, is invalid: it
@@ -197,6 +199,38 @@ TESTS |= {
         *["lights"] * ("/lights/" in file and not file.endswith(CHOICES)),
     )
 }
+# what features concern beside their order: tests in rooms of their subject
+ROOMS_OF_FEATURES = {
+    "absorption": "materials/test_absorption.py",
+    "alpha": "materials/test_alpha.py",
+    "background": "scene/test_background.py",
+    "black_lights": "scene/test_scene.py",
+    "branches": "integrators/test_branches.py",
+    "caustics": "integrators/test_caustics.py",
+    "compiling": "scene/test_scene.py",
+    "dispersion": "bsdfs/test_channels.py",
+    "guide": "guiding",
+    "instances": "shapes/test_instances.py",
+    "interpolation": "textures",
+    "media": "media",
+    "motion": "motion",
+    "nested": "media",
+    "normal_maps": "textures",
+    "passing": "materials/test_alpha.py",
+    "receivers": "lights",
+    "shadow_catchers": "bsdfs/test_shadow_catcher.py",
+    "shadow_terminator": "features/test_shadow_terminator.py",
+    "unseen": "materials/test_visible_to_camera.py",
+    "view": "physics/test_equal_means.py",
+}
+TESTS |= {
+    f"wavefront/features/{name}.py": ("tests/features/test_order.py", f"tests/{room}")
+    for name, room in ROOMS_OF_FEATURES.items()
+}
+FILES_OF = {
+    "densities": DENSITIES,
+    "features": [f"wavefront/features/{name}.py" for name in ROOMS_OF_FEATURES],
+}
 UNUSABLE = 6  # status of a mutant that cannot be imported, beside those of pytest
 CONSTANTS = (bool, int, float, str, tuple, list, dict, np.generic, np.ndarray)
 DENSITY_NAMES = ("pdf", "pmf", "density", "chance", "mixed")
@@ -254,12 +288,33 @@ class Finder(ast.NodeVisitor):
         before = len(self.found)
         for statement in node.body:
             self.visit(statement)
+            if "features" in self.kinds:
+                self.leave_out(statement, node.name)
         # in functions that return a density the values on the way to it would be scaled twice
         parts = [each for each in self.found[before:] if "()" in each.what or "sample" in each.what]
         if "densities" in self.kinds and len(parts) > 1:
             edits = tuple(edit for part in parts for edit in part.edits)
             self.found.append(
                 Mutant(self.file, node.lineno, edits, f"all densities of {node.name} x {self.by}")
+            )
+
+    def leave_out(self, statement: ast.stmt, of: str) -> None:
+        """Leave a method or an attribute out of a class, but for what Python itself asks for."""
+        if isinstance(statement, ast.FunctionDef):
+            first, name = (statement.decorator_list or [statement])[0], statement.name
+        elif isinstance(statement, ast.Assign):
+            first, name = statement, self.text(statement.targets[0])
+        else:
+            return
+        if not name.startswith("_"):
+            start = (
+                self.begins[first.lineno - 1]
+                + len(self.lines[first.lineno - 1])
+                - len(self.lines[first.lineno - 1].lstrip())
+            )
+            end = self.begins[statement.end_lineno - 1] + statement.end_col_offset
+            self.found.append(
+                Mutant(self.file, statement.lineno, ((start, end, "pass"),), f"{of}.{name} left out")
             )
 
     def visit_AnnAssign(self, node: ast.AnnAssign) -> None:
@@ -407,6 +462,8 @@ def apply(mutant: Mutant) -> None:
 def _replace_code(old: Any, new: Any) -> None:
     """Let a function, or all methods of a class, do what another does."""
     if isinstance(old, type):
+        for key in vars(old).keys() - vars(new).keys():
+            delattr(old, key)
         for key, value in vars(new).items():
             if key in vars(old):
                 if isinstance(_function(value), types.FunctionType):
@@ -509,7 +566,7 @@ def main() -> int:
     parser.add_argument("--verbose", action="store_true", help="print those that are killed, too")
     given = parser.parse_args()
     kinds = set(given.kinds.split(","))
-    files = given.files or (DENSITIES if kinds == {"densities"} else FORMULAS)
+    files = given.files or (FILES_OF.get(given.kinds, FORMULAS))
     first, step = (int(each) for each in given.part.split("/"))
     mutants = [mutant for file in files for mutant in mutants_of(file, kinds, given.by)]
     mutants = [mutant for mutant in mutants if mutant.line >= given.from_line][first::step]

@@ -42,12 +42,12 @@ NAMES = ["numpy", pytest.param("embree", marks=pytest.mark.skipif(not installed(
 
 
 @pytest.mark.parametrize(("scale", "offset"), PLACES)
-@pytest.mark.parametrize("subdivisions", [0, 2, 4])
+@pytest.mark.parametrize("subdivisions", [0, pytest.param(2, marks=pytest.mark.slow), 4])
 def test_no_ray_escapes_a_closed_mesh(subdivisions: int, scale: float, offset: float) -> None:
-    """Case 20 of the reference values, with a tenth of its rays."""
+    """Case 20 of the reference values, with a twentieth of its rays."""
     triangles = (sphere_mesh(subdivisions) * scale + offset).astype(f4)
-    rays = aimed_rays(triangles.astype(float), 40_000, 1)
-    hits = make_accelerator(geometry(triangles), "numpy").closest(*rays, nothing(40_000))
+    rays = aimed_rays(triangles.astype(float), 20_000, 1)
+    hits = make_accelerator(geometry(triangles), "numpy").closest(*rays, nothing(20_000))
     assert (hits.prim < 0).sum() == 0
 
 
@@ -134,7 +134,7 @@ def check_against_brute_force(
     np.testing.assert_allclose(point, wanted, atol=2e-5 * size)
 
 
-@settings(max_examples=60, deadline=None, derandomize=True)
+@settings(max_examples=30, deadline=None, derandomize=True)
 @given(
     st.integers(1, 400), st.integers(0, 10**6), st.sampled_from([0.02, 0.3, 2.0]), st.sampled_from([0.0, 3.0])
 )
@@ -172,7 +172,7 @@ def test_batches_have_the_same_bits(accelerator: Accelerator, size: int) -> None
 
 
 def test_order_does_not_matter(accelerator: Accelerator) -> None:
-    n = 20_000
+    n = 8_000
     origin, direction = random_rays(n, 8)
     order = np.random.default_rng(9).permutation(n)
     straight = accelerator.closest(origin, direction, nothing(n))
@@ -182,7 +182,7 @@ def test_order_does_not_matter(accelerator: Accelerator) -> None:
 
 
 def test_threads_do_not_disturb_each_other(accelerator: Accelerator) -> None:
-    rays = [(*random_rays(6000, seed), nothing(6000)) for seed in range(6)]
+    rays = [(*random_rays(2000, seed), nothing(2000)) for seed in range(6)]
     alone = [accelerator.closest(*r) for r in rays]
     with ThreadPoolExecutor(4) as pool:
         together = list(pool.map(lambda r: accelerator.closest(*r), rays))
@@ -264,7 +264,7 @@ def test_degenerate_triangles_are_never_hit(name: str) -> None:
 def test_rays_along_axes_with_either_zero(subdivisions: int) -> None:
     accelerator = make_accelerator(geometry(sphere_mesh(subdivisions)), "numpy")
     rng = np.random.default_rng(12)
-    n = 3000
+    n = 1000
     for tiny in (0.0, -0.0, 1e-40, -1e-40, 1e-30):
         for axis in range(3):
             origin = rng.uniform(-0.4, 0.4, (3, n)).astype(f4)

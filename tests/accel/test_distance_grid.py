@@ -113,7 +113,7 @@ def test_the_first_root_of_the_trilinear_field_is_hit(seed: int) -> None:
 @closed
 def test_no_ray_leaks_through_the_borders_of_cells(name: str) -> None:
     """From corners of cells along lines that pass through edges and corners."""
-    rng, values, n = np.random.default_rng(1), CLOSED[name], 20_000
+    rng, values, n = np.random.default_rng(1), CLOSED[name], 10_000
     last = np.array(values.shape[::-1]) - 1.0
     matrix = np.diag([*last, 1.0])
     z, y, x = np.nonzero(values < 0)

@@ -183,7 +183,7 @@ def test_from_outside_inside_and_on_it(shape: object, expected: list) -> None:
 # --- closed forms ---------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("angle", [0, 35, 60, 90])
+@pytest.mark.parametrize("angle", [0, pytest.param(35, marks=pytest.mark.slow), 60, 90])
 @pytest.mark.parametrize("shape", [wf.Cylinders, wf.Capsules])
 def test_silhouettes_have_their_areas(shape: object, angle: float) -> None:
     """Of a cylinder 2rL·sin + πr²·cos (up to the overlap), of a capsule 2rL·sin + πr²."""

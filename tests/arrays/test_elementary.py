@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from inside import elementary
+from inside import elementary, installed
 from numpy._core._multiarray_umath import __cpu_dispatch__, __cpu_features__
 
 import wavefront
@@ -140,24 +140,22 @@ MACHINES: dict[str, Callable[[], dict[str, str]]] = {
 }
 
 
-def pictures(environment: dict[str, str]) -> Any:
-    command = [sys.executable, str(TESTS / "hashes_of_pictures.py")]
+def pictures(environment: dict[str, str], *accelerators: str) -> Any:
+    command = [sys.executable, str(TESTS / "hashes_of_pictures.py"), *accelerators]
     environment = {**os.environ, "PYTHONPATH": str(PACKAGE.parent), **environment}
     run = subprocess.run(command, env=environment, capture_output=True, text=True, check=True)
     return json.loads(run.stdout)
 
 
-@pytest.fixture(scope="module")
-def here() -> Any:
-    return pictures({})
-
-
 @pytest.mark.parametrize("name", MACHINES)
+@pytest.mark.parametrize(
+    "accel", ["numpy", pytest.param("embree", marks=pytest.mark.skipif(not installed(), reason="none"))]
+)
 @pytest.mark.first(1)
-def test_pictures_have_the_same_bits_on_every_machine(here: Any, name: str) -> None:
+def test_pictures_have_the_same_bits_on_every_machine(name: str, accel: str) -> None:
     if __cpu_features__.get("ASIMD"):
         pytest.skip("the groups of instructions are those of x86")
-    there = pictures(MACHINES[name]())
+    here, there = (pictures(environment, accel) for environment in ({}, MACHINES[name]()))
     if "SSE" in name:
         assert there.pop("numpy's own sine") != here["numpy's own sine"]  # or else this tests nothing
     assert {key: value for key, value in here.items() if key in there} == there

@@ -99,8 +99,8 @@ def test_a_composite_over_a_color_is_the_picture_with_that_background() -> None:
 
 
 def test_pictures_with_catchers_are_the_same_bits_for_any_division() -> None:
-    first = alpha_of(wf.Environment(SKY), spp=8, accel="numpy")
+    first = alpha_of(wf.Environment(SKY), spp=2, accel="numpy")
     for settings in ({"workers": 2, "executor": "threads"}, {"wave_size": 100}):
-        other = alpha_of(wf.Environment(SKY), spp=8, accel="numpy", **settings)
+        other = alpha_of(wf.Environment(SKY), spp=2, accel="numpy", **settings)
         assert first.rgb.tobytes() == other.rgb.tobytes()
         assert first.alpha.tobytes() == other.alpha.tobytes()

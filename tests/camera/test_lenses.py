@@ -205,7 +205,7 @@ CROPPED = {
 
 
 @pytest.mark.parametrize("kind", CROPPED)
-@pytest.mark.parametrize("sampler", ["sobol", "independent"])
+@pytest.mark.parametrize("sampler", ["sobol", pytest.param("independent", marks=pytest.mark.slow)])
 def test_a_window_is_cut_from_the_picture(kind: str, sampler: str) -> None:
     shapes = [wf.Sphere((0, 0, 0), 1), wf.Rectangle((-3, -1, 3), (6, 0, 0), (0, 0, -6))]
     options = {"sampler": sampler, "max_bounces": 3, "progress": False}

@@ -171,7 +171,7 @@ def test_distortion_is_undone(name: str) -> None:
     assert np.hypot(again[0] - x, again[1] - y).max() < 1e-9
 
 
-@settings(max_examples=50, deadline=None)
+@settings(max_examples=25, deadline=None)
 @given(
     st.tuples(*[st.floats(-0.4, 0.4)] * 2, *[st.floats(-0.01, 0.01)] * 2, st.floats(-0.2, 0.2)),
     st.floats(0.2, 1.5),

@@ -255,8 +255,11 @@ def test_completion_says_what_it_needs(missing, capsys) -> None:
     assert "pip install shtab" in capsys.readouterr().err
 
 
-def test_doctor_says_what_is_there_and_tests_it(run) -> None:
-    done = run("doctor", "--seconds", "1")
+def test_doctor_says_what_is_there_and_tests_it(run, calls_of) -> None:
+    measure = doctor_command.measure_speeds
+    calls = calls_of("wavefront.cli.doctor_command.measure_speeds", lambda seconds, _: measure(0.1, 1))
+    done = run("doctor", "--seconds", "5")
+    assert calls[0].args[0] == 3.0
     assert (done.returncode, done.stderr) == (0, "")
     assert done.stdout.startswith(f"wavefront {wf.__version__}, Python {sys.version.split()[0]}")
     for text in (f"numpy {np.__version__}", "cores: ", "BLAS: ", "NumPy uses ", "--guide: ", *EXTRAS):
@@ -280,6 +283,7 @@ def test_doctor_gives_1_when_a_test_fails(monkeypatch, calls_of, capsys) -> None
     monkeypatch.setattr(doctor_command, "Diffuse", lambda reflectance: gray)
     assert not doctor_command.check_furnace().passed
     calls_of("wavefront.cli.doctor_command.measure_speeds", lambda seconds, workers: [])
+    calls_of("wavefront.cli.doctor_command.check_workers", lambda: doctor_command.CheckResult("", True, ""))
     assert cli.main(["doctor"]) == 1
     assert "  FAILED  furnace: a white sphere" in capsys.readouterr().out
 

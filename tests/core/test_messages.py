@@ -13,7 +13,7 @@ from inside import plain, warn_caller, write_image
 
 import wavefront as wf
 
-LONG = "x" * 10_000_000
+LONG = "x" * 1_000_000
 ESCAPE = "\x1b[31m\x07\x9b\u202e"
 
 
@@ -30,7 +30,7 @@ ESCAPE = "\x1b[31m\x07\x9b\u202e"
     ],
 )
 def test_errors_of_files_are_short(tmp_path: Path, name: str, text: str) -> None:
-    """Ten megabytes in a line; the message, an error or a warning, has both of its ends."""
+    """A megabyte in a line; the message, an error or a warning, has both of its ends."""
     (tmp_path / name).write_text(text)
     with pytest.raises((wf.SceneError, UserWarning), match=rf"{name}") as error:
         wf.load(tmp_path / name)

@@ -157,9 +157,22 @@ def test_none_brings_the_default_back() -> None:
 
 
 def test_copies_keep_their_parameters() -> None:
-    for material, _ in MATERIALS.values():
-        for other in (copy.copy(material), copy.deepcopy(material), pickle.loads(pickle.dumps(material))):
-            assert seen(other) == seen(material)
+    """Balls of all materials, in a row, look the same with copies of them."""
+    camera = wf.Camera.orthographic((0, 0, 5), (0, 0, 0), height=1, size=(8 * len(MATERIALS), 8))
+
+    def row(copied):
+        balls = [
+            wf.Sphere((k - (len(MATERIALS) - 1) / 2, 0, 0), 0.5, material=copied(material))
+            for k, (material, _) in enumerate(MATERIALS.values())
+        ]
+        return render(
+            wf.Scene(balls, [wf.Environment(np.linspace(0, 1, 96).reshape(4, 8, 3))], camera), 4
+        ).rgb
+
+    plain = row(lambda material: material)
+    assert all(ball.std() > 0 for ball in np.split(plain, len(MATERIALS), 1))
+    for copied in (copy.copy, copy.deepcopy, lambda material: pickle.loads(pickle.dumps(material))):
+        assert row(copied).tobytes() == plain.tobytes()
 
 
 @pytest.mark.parametrize(

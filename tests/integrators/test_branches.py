@@ -26,8 +26,8 @@ def shade_and_sun(size: tuple[int, int] = (8, 8)) -> wf.Scene:
 @pytest.mark.first(1)
 def test_branches_keep_the_mean(sampler: str, branches: int) -> None:
     options = {"max_bounces": 8, "sampler": sampler}
-    usual = repeat(scenes.room(), 64, **options)
-    other = repeat(scenes.room(), 32, branches=branches, first_seed=100, **options)
+    usual = repeat(scenes.room(), 16, **options)
+    other = repeat(scenes.room(), 8, branches=branches, first_seed=100, **options)
     assert_same_images(usual, other, 0.01)
 
 

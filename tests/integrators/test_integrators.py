@@ -71,7 +71,7 @@ def test_roulette_changes_nothing_but_noise(integrator: str, after: int) -> None
 def test_full_has_a_tenth_of_the_variance_of_naive() -> None:
     variance = {}
     for integrator in scenes.INDIRECT:
-        runs = repeat(scenes.cornell_box(), 64, runs=8, integrator=integrator)
+        runs = repeat(scenes.cornell_box(), 64, runs=4, integrator=integrator)
         variance[integrator] = runs.var(0, ddof=1).mean()
     assert variance["full"] < 0.1 * variance["naive"]
 

@@ -434,7 +434,7 @@ def ground(y: float = 0) -> wf.Mesh:
 def assert_light(scene: wf.Scene, expected, max_bounces: int, max_error: float = 0.01) -> None:
     """Compare the mean of paths from lights with its exact value (3,)."""
     traced = Tracer.of(scene)
-    found = np.stack([traced.light(seed, 8192, max_bounces).mean((0, 1)) for seed in range(8)])
+    found = np.stack([traced.light(seed, 2048, max_bounces).mean((0, 1)) for seed in range(8)])
     expected = np.broadcast_to(expected, 3)
     mean, error = found.mean(0), found.std(0, ddof=1) / np.sqrt(len(found))
     print(f"found {mean} ± {error}, must be {expected}")

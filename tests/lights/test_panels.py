@@ -169,7 +169,7 @@ def room() -> wf.Scene:
 @pytest.mark.first(1)
 def test_pictures_keep_their_means(options: dict) -> None:
     """Those of BSDF samples alone, for which light samples do not count."""
-    found = repeat(room(), 12, 12, **SETTINGS, **options)
+    found = repeat(room(), 4, 12, **SETTINGS, **options)
     assert_same_images(found, by_bsdf_samples(), max_error=0.05)
 
 

@@ -30,6 +30,7 @@ def test_cases_without_skies(name: str) -> None:
 
 
 @pytest.mark.parametrize(("name", "type"), [*zip(TABLES, TYPES[2:], strict=True)])
+@pytest.mark.first(5)
 def test_tables_under_one_sky(name: str, type: int) -> None:
     check(TABLES[name].run(2048, (type,)), 0.1)
 

@@ -73,7 +73,7 @@ def test_a_furnace_is_as_bright_with_shared_paths(kind: str, factor: float) -> N
 def test_sharing_changes_no_mean(kind: str, settings: dict[str, Any]) -> None:
     scene = scenes.cornell_box()
     scene.shapes[0].material = wf.Diffuse((0.9, 0.5, 0.1))
-    plain, shared = (of_tiles(scene, kind, spp=16, reuse=each, **settings) for each in (False, True))
+    plain, shared = (of_tiles(scene, kind, spp=4, reuse=each, **settings) for each in (False, True))
     assert_mean(Mean.of(1 + (shared - plain) / plain.mean()), 1, 0.02)
 
 

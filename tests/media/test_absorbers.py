@@ -363,8 +363,8 @@ SHARED = {
 def test_shared_paths_through_absorbers(name: str) -> None:
     scene = SHARED[name]()
     assert compile_scene(scene, lambda g: make_accelerator(g, "numpy")).media is not None
-    own = repeat(scene, 32, runs=8, reuse=False, max_bounces=4)
-    shared = repeat(scene, 32, runs=8, first_seed=100, reuse=True, max_bounces=4)
+    own = repeat(scene, 8, runs=8, reuse=False, max_bounces=4)
+    shared = repeat(scene, 8, runs=8, first_seed=100, reuse=True, max_bounces=4)
     assert_same_images(own, shared, 0.02)
 
 

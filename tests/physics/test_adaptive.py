@@ -288,9 +288,9 @@ def closed(size: tuple[int, int]) -> wf.Scene:
 @pytest.mark.filterwarnings("ignore:paths have met more than")  # as a fast machine does in the time
 def test_time_ends_waves_under_way() -> None:
     """Also those of first samples, if they take long: there is no picture then, and the error says why."""
-    message = r"no picture: when seconds=1 were over, .* had met (\d+) surfaces; .* lower max_bounces"
+    message = r"no picture: when seconds=0.4 were over, .* had met (\d+) surfaces; .* lower max_bounces"
     with pytest.raises(wf.RenderError, match=message) as caught:
-        render(closed((64, 64)), None, seconds=1, max_bounces=2**16, workers=2)
+        render(closed((64, 64)), None, seconds=0.4, max_bounces=2**16, workers=2)
     assert caught.value.image is None
     met = re.search(message, str(caught.value))
     assert met is not None

@@ -11,6 +11,7 @@ import threading
 import time
 from collections.abc import Callable, Iterator
 from concurrent.futures import BrokenExecutor
+from functools import cache
 from multiprocessing.connection import Connection
 from pathlib import Path
 from typing import Any
@@ -327,6 +328,21 @@ def test_a_daemon_has_threads() -> None:
 # --- pictures -------------------------------------------------------------------------------------
 
 
+def settings_of(kind: str, accel: str) -> dict[str, Any]:
+    """Return the settings of a picture, or of points at which light is measured."""
+    options: dict[str, Any] = {"accel": accel, "progress": False, "wave_size": 500}
+    if kind != "picture":
+        points = np.random.default_rng(0).uniform(-1, 1, (63, 3))
+        options["camera"] = Sensors(points, (0, 1, 0) if kind == "irradiance" else None, kind)
+    return options
+
+
+@cache
+def by_one_worker(kind: str, accel: str) -> wf.Image:
+    """Return what one thread finds."""
+    return wf.render(scenes.everything(), 8, workers=1, executor="threads", **settings_of(kind, accel))
+
+
 @pytest.mark.parametrize("executor", EXECUTORS)
 @pytest.mark.parametrize(
     ("kind", "accel"),
@@ -339,12 +355,9 @@ def test_a_daemon_has_threads() -> None:
     ],
 )
 def test_the_executor_changes_no_bit(executor: str, accel: str, kind: str) -> None:
-    options: dict[str, Any] = {"accel": accel, "progress": False, "wave_size": 500}
-    if kind != "picture":
-        points = np.random.default_rng(0).uniform(-1, 1, (63, 3))
-        options["camera"] = Sensors(points, (0, 1, 0) if kind == "irradiance" else None, kind)
+    options = settings_of(kind, accel)
     image = wf.render(scenes.everything(), 8, workers=2, executor=executor, **options)
-    alone = wf.render(scenes.everything(), 8, workers=1, executor="threads", **options)
+    alone = by_one_worker(kind, accel)
     assert image.rgb.tobytes() == alone.rgb.tobytes()
     assert image.metadata["executor"] == executor
     assert image.metadata["rays"] == alone.metadata["rays"]

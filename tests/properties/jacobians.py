@@ -36,7 +36,7 @@ LARGEST_BOUND = 0.02  # of the error of a derivative, relative
 # parts of the examples of the profile: what one costs differs
 some = settings(max_examples=settings.default.max_examples // 4)
 few = settings(max_examples=settings.default.max_examples // 10)
-fewest = settings(max_examples=settings.default.max_examples // 20)
+fewest = settings(max_examples=settings.default.max_examples // 33)
 
 # float32 numbers, away from 0 and 1, so that differences have room on both sides
 inner = st.floats(2.0**-13, 1 - 2.0**-13, width=32)

@@ -41,18 +41,26 @@ def blocks():
 
 @pytest.fixture
 def few_samples(tmp_path, monkeypatch, short_training):
-    """Let renders take one sample of each of few pixels, and guides learn little, in an empty folder."""
-    render, render_many = wf.render, wf.render_many
+    """Let renders take few samples of each of few pixels, and guides learn little, in an empty folder."""
+    render, render_many, measure = wf.render, wf.render_many, wf.measure
 
     def quick(scene, spp=MOST_SPP, noise=None, **options):
-        few = {} if "samples" in options else {"spp": min(spp, MOST_SPP)}
+        few = {"spp": min(spp, MOST_SPP)}
+        if "samples" in options:  # of which something is compared, so that they have errors
+            samples = options.pop("samples")
+            few = {"samples": min(samples, 4) if isinstance(samples, int) else samples}
         if "camera" not in options and getattr(scene, "camera", None) is None:
-            few["size"] = options.pop("size", (48, 32))
+            width, height = options.pop("size", (48, 32))
+            few["size"] = (width // 3, height // 3) if width > 200 else (width, height)
         return render(scene, **few, progress=False, **options)
 
     def quick_many(scene, cameras, spp=MOST_SPP, **options):
         return render_many(scene, cameras, min(spp, MOST_SPP), progress=False, **options)
 
+    def quick_measure(*arguments, spp=4, **options):
+        return measure(*arguments, spp=min(spp, 4), **options)
+
+    monkeypatch.setattr(wf, "measure", quick_measure)
     monkeypatch.setattr(wf, "render", quick)
     monkeypatch.setattr(wf, "render_many", quick_many)
     monkeypatch.chdir(tmp_path)

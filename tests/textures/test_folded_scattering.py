@@ -1,6 +1,7 @@
 """Scattering around tilted normals, folded at the surface: its density, its energy, and one mean."""
 
 from dataclasses import replace
+from functools import cache
 
 import numpy as np
 import pytest
@@ -146,12 +147,17 @@ WAYS = [
 ]
 
 
+@cache
+def scene_and_pictures(bsdf, shines):
+    """A scene whose wall shines, or that the sun lights, its bounces, and pictures by the usual way."""
+    lights = [] if shines else [wf.DirectionalLight((0, 0, -1), 1)]
+    scene, bounces = beside_a_wall(bsdf, *lights, emission=1.0 if shines else None), 1 if shines else 2
+    return scene, bounces, repeat(scene, 64, runs=8, max_bounces=bounces, reuse=False, first_seed=100)
+
+
 @pytest.mark.parametrize("bsdf", [wf.Diffuse(1.0), wf.Conductor.named("silver", roughness=0.5)])
 @pytest.mark.parametrize("options", WAYS, ids=str)
 def test_every_way_finds_the_same_light(bsdf, options):
-    if "integrator" in options:
-        scene, bounces, spp = beside_a_wall(bsdf, emission=1.0), 1, 256
-    else:
-        scene, bounces, spp = beside_a_wall(bsdf, wf.DirectionalLight((0, 0, -1), 1)), 2, 64
-    expected = repeat(scene, 64, runs=8, max_bounces=bounces, reuse=False, first_seed=100)
+    scene, bounces, expected = scene_and_pictures(bsdf, "integrator" in options)
+    spp = 256 if "integrator" in options else 64
     assert_same_images(repeat(scene, spp, runs=8, max_bounces=bounces, **options), expected, 0.02)
