@@ -1,11 +1,11 @@
 """Scenes in which something moves: each of their times is a still scene."""
 
 import gc
-import time
 from copy import deepcopy
 
 import numpy as np
 import pytest
+from counting import calls
 
 import wavefront as wf
 
@@ -407,16 +407,25 @@ def test_scenes_that_move_are_copied():
 
 
 def test_many_instances_are_placed_together():
-    count = 20_000
-    rng = np.random.default_rng(0)
-    ends = np.tile(np.eye(4), (count, 2, 1, 1))
-    ends[:, :, :3, 3] = rng.normal(size=(count, 2, 3))
-    few = [wf.Keyframes([0, 1], each) for each in ends[:50]]
-    instances = wf.Instance.many(triangle(), [few[k % 50] for k in range(count)])
+    def scene(count):
+        found = wf.Scene(wf.Instance.many(triangle(), [few[k % 50] for k in range(count)]))
+        found.at(0)
+        return found
+
+    ends = np.tile(np.eye(4), (50, 2, 1, 1))
+    ends[:, :, :3, 3] = np.random.default_rng(0).normal(size=(50, 2, 3))
+    few = [wf.Keyframes([0, 1], each) for each in ends]
+    several, many = scene(50), scene(550)
+    np.testing.assert_array_equal(many.at(0.25).shapes[57].transform, few[7].at(0.25))
+    # two calls look at an instance and make its copy; a loop over motions takes hundreds
+    assert calls(lambda: many.at(0.75)) - calls(lambda: several.at(0.75)) <= 2.5 * 500
+
+
+def test_instances_of_a_moment_keep_attributes_of_ones_own_and_know_new_motions():
+    instances = wf.Instance.many(triangle(), [SLIDE, SLIDE, SLIDE])
+    instances[1].label = "mine"
     scene = wf.Scene(instances)
-    scene.at(0)
-    begin = time.process_time()
-    still = scene.at(0.25)
-    spent = time.process_time() - begin
-    np.testing.assert_array_equal(still.shapes[7].transform, few[7].at(0.25))
-    assert spent < 0.02 * 20, f"{spent:.3f} s for {count} instances"  # a loop over motions takes seconds
+    assert [vars(each).get("label") for each in scene.at(1).shapes] == [None, "mine", None]
+    instances[2].transform = wf.Keyframes([0, 2], [moved(), moved(0, 8)])
+    assert scene.at(1).shapes[2].transform[:3, 3].tolist() == [0, 4, 0]
+    assert not any("motion" in vars(each) for each in scene.at(1).shapes)

@@ -49,6 +49,12 @@ def sin_cos(x: Reals) -> tuple[Reals, Reals]:
     return angle * _horner(z, _SIN[z.dtype]), _horner(z, _COS[z.dtype])
 
 
+def sin(x: Reals) -> Reals:
+    """Return the sine of angles x in [−π/2, π/2], radians, as `sin_cos` does."""
+    angle: Any = x
+    return angle * _horner(angle * angle, _SIN[angle.dtype])
+
+
 def arctan2(y: Reals, x: Reals) -> Reals:
     """Return the angle of the point (x, y), radians in [−π, π]; 0 or ±π for (±0, 0).
 

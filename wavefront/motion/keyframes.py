@@ -13,6 +13,7 @@ from .motion import Motion
 from .quaternions import determinants, polar, quaternions_of, rotation_of
 from .track import Track
 
+AT_ONCE = 1 << 12  # matrices that are composed at once, so that temporary arrays fit the cache
 SINGULAR = 1e-12  # least scale of a matrix along an axis, relative to the greatest
 
 
@@ -69,6 +70,14 @@ class Trs(Motion):
 def composed(translation: Doubles, rotation: Doubles, scale: Doubles) -> Doubles:
     """Return matrices (n, 4, 4): translation (n, 3) · quaternion (n, 4) · scale (n, 3) or (n, 3, 3)."""
     matrix = np.empty((len(translation), 4, 4))
+    for begin in range(0, len(matrix), AT_ONCE):
+        some = slice(begin, begin + AT_ONCE)
+        _compose(matrix[some], translation[some], rotation[some], scale[some])
+    return matrix
+
+
+def _compose(matrix: Doubles, translation: Doubles, rotation: Doubles, scale: Doubles) -> None:
+    """Write what `composed` returns."""
     turn = np.ascontiguousarray(rotation_of(rotation).transpose(1, 2, 0))
     factors = np.ascontiguousarray(np.moveaxis(scale, 0, -1))
     with np.errstate(over="ignore", invalid="ignore"):
@@ -77,7 +86,6 @@ def composed(translation: Doubles, rotation: Doubles, scale: Doubles) -> Doubles
                 matrix[:, i, j] = turn[i, j] * factors[j] if scale.ndim == 2 else _row(turn[i], factors[:, j])
     matrix[:, :3, 3] = translation
     matrix[:, 3] = 0, 0, 0, 1
-    return matrix
 
 
 def _row(a: Doubles, b: Doubles) -> Doubles:

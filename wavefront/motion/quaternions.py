@@ -11,8 +11,8 @@ from functools import reduce
 
 import numpy as np
 
-from ..arrays.elementary import arctan2, sin_cos
-from ..arrays.vec import Doubles
+from ..arrays.elementary import arctan2, sin
+from ..arrays.vec import Doubles, Ints
 
 MOST_STEPS = 64  # of Newton's method, which needs ten
 SETTLED = 4 * float(np.finfo(np.float64).eps)
@@ -21,15 +21,17 @@ PARALLEL = 1e-9  # sine of an angle below which slerp is linear
 
 def rotation_of(quaternions: Doubles) -> Doubles:
     """Return the matrices (n, 3, 3) of quaternions (n, 4) of any length; 0 means no rotation."""
+    rows = quaternions.T
     with np.errstate(over="ignore", divide="ignore"):
-        size = (quaternions[:, None] @ quaternions[:, :, None])[:, 0, 0]
+        size = _dot(rows, rows)
         factor = np.where(size > 0, np.sqrt(2 / size), 0)
-    x, y, z, w = (quaternions * factor[:, None]).T
-    out = np.empty((len(quaternions), 3, 3))
-    out[:, 0] = np.stack([1 - y * y - z * z, x * y - z * w, x * z + y * w], 1)
-    out[:, 1] = np.stack([x * y + z * w, 1 - x * x - z * z, y * z - x * w], 1)
-    out[:, 2] = np.stack([x * z - y * w, y * z + x * w, 1 - x * x - y * y], 1)
-    return out
+    x, y, z, w = rows * factor
+    out = np.empty((3, 3, len(quaternions)))
+    xx, yy, zz, xy, xz, yz, xw, yw, zw = x * x, y * y, z * z, x * y, x * z, y * z, x * w, y * w, z * w
+    out[0] = 1 - yy - zz, xy - zw, xz + yw
+    out[1] = xy + zw, 1 - xx - zz, yz - xw
+    out[2] = xz - yw, yz + xw, 1 - xx - yy
+    return out.transpose(2, 0, 1)
 
 
 def quaternions_of(rotations: Doubles) -> Doubles:
@@ -52,26 +54,49 @@ def quaternions_of(rotations: Doubles) -> Doubles:
     return best / _length(best)
 
 
+class Arcs:
+    """The shorter turns from some unit quaternions to others.
+
+    Parameters
+    ----------
+    a, b
+        (n, 4).
+    """
+
+    def __init__(self, a: Doubles, b: Doubles) -> None:
+        self._first, self._second = a.T.copy(), b.T.copy()  # contiguous over the quaternions
+        self._second *= np.where(_dot(self._first, self._second) < 0, -1.0, 1.0)
+        self._angle = 2 * arctan2(_norm(self._first - self._second), _norm(self._first + self._second))
+        self._sine = sin(self._angle)
+
+    def at(self, part: Doubles, arc: Ints | None = None) -> Doubles:
+        """Return the quaternions (4, n) after parts (n,) in [0, 1] of arcs: all of them, or by index."""
+        p, q, angle, sine = self._first, self._second, self._angle, self._sine
+        if arc is not None:
+            p, q, angle, sine = p.take(arc, 1), q.take(arc, 1), angle.take(arc), sine.take(arc)
+        apart, left = sine > PARALLEL, 1 - part
+        safe = np.where(apart, sine, 1)
+        between = np.where(apart, sin(left * angle) / safe, left) * p
+        between += np.where(apart, sin(part * angle) / safe, part) * q
+        between /= _norm(between)
+        return between
+
+
 def slerp(a: Doubles, b: Doubles, part: Doubles) -> Doubles:
     """Return the quaternions (n, 4) between unit ones, the shorter way, at parts (n, 1) in [0, 1]."""
-    p, q, t = a.T.copy(), b.T.copy(), part[:, 0]  # contiguous over the quaternions
-    x, y, z, w = p * q
-    q *= np.where(x + y + z + w < 0, -1.0, 1.0)
-    angle = 2 * arctan2(_norm(p - q), _norm(p + q))
-    sine = sin_cos(angle)[0]
-    apart = sine > PARALLEL
-    safe = np.where(apart, sine, 1)
-    first = np.where(apart, sin_cos((1 - t) * angle)[0] / safe, 1 - t)
-    second = np.where(apart, sin_cos(t * angle)[0] / safe, t)
-    between = first * p + second * q
-    return np.ascontiguousarray((between / _norm(between)).T)
+    return Arcs(a, b).at(part[:, 0]).T
+
+
+def _dot(a: Doubles, b: Doubles) -> Doubles:
+    """Return the scalar products (n,) of quaternions (4, n), each added up in order."""
+    x, y, z, w = a * b
+    out: Doubles = x + y + z + w
+    return out
 
 
 def _norm(rows: Doubles) -> Doubles:
     """Return the lengths (n,) of quaternions (4, n)."""
-    x, y, z, w = rows
-    out: Doubles = np.sqrt(x * x + y * y + z * z + w * w)
-    return out
+    return np.sqrt(_dot(rows, rows))
 
 
 def normalized(quaternions: Doubles) -> Doubles:

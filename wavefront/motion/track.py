@@ -10,7 +10,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from ..arrays.vec import Doubles, Ints
-from .quaternions import normalized, slerp
+from .quaternions import Arcs, normalized, slerp
 
 STEP, LINEAR, CUBIC = "step", "linear", "cubic"
 
@@ -56,22 +56,53 @@ class Track:
         return self.at_times(np.array([time], np.float64))[0]
 
 
+class Lines:
+    """Straight ways from some values to others.
+
+    Parameters
+    ----------
+    a, b
+        (n, ...).
+    """
+
+    def __init__(self, a: Doubles, b: Doubles) -> None:
+        self._first = np.ascontiguousarray(np.moveaxis(a, 0, -1))
+        self._way = np.ascontiguousarray(np.moveaxis(b - a, 0, -1))
+
+    def at(self, part: Doubles, line: Ints) -> Doubles:
+        """Return the values (..., n) after parts (n,) in [0, 1] of lines, by index."""
+        values = self._way.take(line, -1)
+        values *= part
+        values += self._first.take(line, -1)
+        return values
+
+
 class Bundle:
     """Tracks of one way and one shape of values, which are evaluated together at one time."""
 
     def __init__(self, tracks: Sequence[Track]) -> None:
-        self.like, counts = tracks[0], np.array([len(track.times) for track in tracks])
-        self.times = np.concatenate([track.times for track in tracks])
-        self.values = np.concatenate([track.values for track in tracks])
-        self.ends = np.cumsum(counts)
-        self.begins = self.ends - counts
+        self._like, counts = tracks[0], np.array([len(track.times) for track in tracks])
+        self._times = np.concatenate([track.times for track in tracks])
+        self._values = np.concatenate([track.values for track in tracks])
+        self._begins = np.cumsum(counts) - counts
+        self._after = np.arange(1, len(self._times) + 1)
+        self._after[self._begins + counts - 1] -= 1  # the last key of a track holds
+        span = self._times[self._after] - self._times
+        self._span = np.where(span > 0, span, 1)
+        self._ways: Lines | Arcs | None = None  # from each key to the one after it
+        if self._like.way == LINEAR:
+            self._ways = (Arcs if self._like.turns else Lines)(self._values, self._values[self._after])
 
     def at(self, time: float) -> Doubles:
         """Return the values (n, ...) of the n tracks."""
-        passed = np.add.reduceat(self.times <= time, self.begins, dtype=np.intp)
-        first = self.begins + np.maximum(passed - 1, 0)
-        after = np.minimum(first + 1, self.ends - 1)
-        return _between(self.like, self.times, self.values, first, after, np.float64(time))
+        passed = np.add.reduceat(self._times <= time, self._begins, dtype=np.intp)
+        first = self._begins + np.maximum(passed - 1, 0)
+        if self._ways is None:
+            return _between(
+                self._like, self._times, self._values, first, self._after[first], np.float64(time)
+            )
+        part = np.clip((time - self._times.take(first)) / self._span.take(first), 0, 1)
+        return np.moveaxis(self._ways.at(part, first), -1, 0)
 
 
 def _between(

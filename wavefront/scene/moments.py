@@ -3,14 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any
+from itertools import chain, compress
+from operator import attrgetter, not_
+from typing import Any, NamedTuple, Self
 
 import numpy as np
 
 from ..arrays.vec import Bools, Doubles
-from ..motion import Keyframes, Together
+from ..motion import Deformation, Keyframes, Motion, Together
 from ..motion.quaternions import determinants
-from ..shapes import Instance, Shape
+from ..shapes import Instance, Mesh, Shape
 from ..shapes.instance import placed_together
 
 FLAT = 1e-30  # determinant of a matrix, relative to the cube of its largest element, that flattens a mesh
@@ -27,11 +29,9 @@ class Moments:
     """
 
     def __init__(self, shapes: Sequence[Shape]) -> None:
-        self._key = _identity(shapes)
-        self._shapes = self._key[0]
-        motions, forms = self._key[-2:]
-        still = all(motion is None for motion in motions) and all(motion is None for motion in forms)
-        moving = [] if still else [number for number, shape in enumerate(shapes) if shape.moves]
+        self._identity = Identity.of(shapes)
+        numbers = enumerate(shapes) if self._identity.moves else ()
+        moving = [number for number, shape in numbers if shape.moves]
         placed = [number for number in moving if isinstance(shapes[number], Instance)]
         self.carried = [number for number in placed if shapes[number].motion is not None]
         known = set(self.carried)
@@ -47,13 +47,12 @@ class Moments:
 
     def fits(self, shapes: Sequence[Shape]) -> bool:
         """Return whether these are still the shapes, with the same motions."""
-        return self._key == _identity(shapes)
+        return self._identity == Identity.of(shapes)
 
     def at(self, time: float) -> list[Shape]:
         """Return the shapes at a time; those that a motion flattens to nothing are left out."""
-        shapes: list[Any] = list(self._shapes)
-        deforming = {id(mesh): mesh for mesh in self._key[1] if mesh is not None and mesh.moves}
-        forms = {number: mesh.at(time) for number, mesh in deforming.items()}
+        shapes: list[Any] = list(self._identity.shapes)
+        forms = {id(mesh): mesh.at(time) for mesh in dict.fromkeys(self._identity.meshes) if mesh.moves}
         for number in self.others:
             shape = shapes[number]
             if isinstance(shape, Instance):
@@ -61,23 +60,43 @@ class Moments:
             else:
                 shapes[number] = forms.get(id(shape)) or shape.at(time)
         matrices = self._motions.at(time)
-        instances = [shapes[number] for number in self.carried]
-        for number, instance in zip(self.carried, placed_together(instances, matrices, forms), strict=True):
-            shapes[number] = instance
+        alike = len(self.carried) == len(shapes)
+        instances = shapes if alike else [shapes[number] for number in self.carried]
+        placed = placed_together(instances, matrices, forms)
+        if alike:
+            shapes = placed
+        else:
+            for number, instance in zip(self.carried, placed, strict=True):
+                shapes[number] = instance
         flat = np.flatnonzero(_flattens(matrices)) if self._may_flatten else ()
         for at in map(int, flat):
             shapes[self.carried[at]] = shapes[self.carried[at]].to_mesh().with_area()
         return [shape for shape in shapes if shape is not None]
 
 
-def _identity(shapes: Sequence[Shape]) -> list[list[Any]]:
-    """Return lists that differ once a shape is replaced, or has another mesh, motion or form."""
-    values: list[dict[str, Any]] = list(map(vars, shapes))
-    meshes = list(dict.fromkeys([attributes.get("mesh") for attributes in values]))
-    mesh_of = [attributes.get("mesh") for attributes in values] if len(meshes) > 2 else []
-    formed = [attributes.get("deformation") for attributes in values if "mesh" not in attributes]
-    formed += [vars(mesh).get("deformation") for mesh in meshes if mesh is not None]
-    return [list(shapes), meshes, mesh_of, [attributes.get("motion") for attributes in values], formed]
+class Identity(NamedTuple):
+    """What differs once other shapes are there, or one has another mesh or motion, or another form."""
+
+    shapes: list[Shape]
+    motions: list[Motion | None]  # of each shape
+    meshes: list[Mesh]  # of each instance
+    deformations: list[Deformation | None]  # of the other shapes, and of each distinct mesh
+
+    @classmethod
+    def of(cls, shapes: Sequence[Shape]) -> Self:
+        """Look at all shapes, without a loop over calls, which would take ten times as long."""
+        kinds = list(map(type, shapes))
+        placed = {kind for kind in set(kinds) if issubclass(kind, Instance)}
+        is_placed = list(map(placed.__contains__, kinds))
+        meshes = list(map(attrgetter("mesh"), compress(shapes, is_placed)))
+        alone = [] if len(meshes) == len(kinds) else compress(shapes, map(not_, is_placed))
+        formed = [shape.deformation for shape in (*alone, *dict.fromkeys(meshes))]
+        return cls(list(shapes), list(map(attrgetter("motion"), shapes)), meshes, formed)
+
+    @property
+    def moves(self) -> bool:
+        """Whether anything moves or deforms."""
+        return any(motion is not None for motion in chain(self.motions, self.deformations))
 
 
 def _flattens(matrices: Doubles) -> Bools:

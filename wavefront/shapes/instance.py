@@ -21,6 +21,7 @@ from .mesh import Mesh, check_range
 from .transform import Matrix, affine, moved, moved_tangents
 
 SINGULAR = 1e-12  # least scale of a transform along an axis, relative to the greatest
+USUAL = 5  # attributes of an instance: name, material, mesh, transform and motion
 MOST_PLACED = 1 << 16  # vertices that are transformed at once
 MOST_HULL = 1 << 22  # vertices of all instances of a mesh; above, its box stands for it where it is framed
 CERTAINLY_REGULAR = 1e-6  # above this value, a cheap bound of that ratio is sufficient
@@ -243,16 +244,16 @@ def placed_together(
         By the ids of their meshes, others in their place.
     """
     with unwatched():
-        out: list[I] = list(
-            map(object.__new__, map(type, instances))
-        )  # a loop over calls would take twice as long
-        states = map(dict.copy, map(vars, instances))
-        for instance, values, matrix in zip(out, states, matrices, strict=True):
-            values["transform"] = matrix
-            values.pop("motion", None)
-            if forms:
+        # loops over calls would take twice as long
+        out: list[I] = list(map(object.__new__, map(type, instances)))
+        for values, source, matrix in zip(map(vars, out), map(vars, instances), matrices, strict=True):
+            values["name"], values["_material"] = source["name"], source.get("_material")
+            values["mesh"], values["transform"] = source["mesh"], matrix
+            if len(source) > USUAL:
+                values |= {name: value for name, value in source.items() if name not in {*values, "motion"}}
+        if forms:
+            for values in map(vars, out):
                 values["mesh"] = forms.get(id(values["mesh"]), values["mesh"])
-            instance.__dict__ = values
     return out
 
 
