@@ -518,10 +518,10 @@ def _expand(tree: Bvh, rays: _Lines, t_far: Floats, node: Ints, lane: Ints) -> t
     for start in range(0, nodes.size, step):
         chosen = nodes[start : start + step]
         k = chosen.size
-        some = block_lanes[start * BLOCK : (start + k) * BLOCK]
+        chunk = block_lanes[start * BLOCK : (start + k) * BLOCK]
         line = scratch("rays", (6, k, BLOCK))
         for row in range(6):
-            np.take(rays.line[row], some, 0, line[row].reshape(-1), "clip")
+            np.take(rays.line[row], chunk, 0, line[row].reshape(-1), "clip")
         dx, dy, dz = line[:3]
         cx, cy, cz = tree.center.take(chosen, 0).T[:, :, None]
         line[3] -= cy * dz - cz * dy
@@ -536,7 +536,7 @@ def _expand(tree: Bvh, rays: _Lines, t_far: Floats, node: Ints, lane: Ints) -> t
         block = pair // width
         slot = chosen.take(block) * width + (pair & (width - 1))
         place = (block << BLOCK_SHIFT) + (hit & (BLOCK - 1))
-        lane = some.take(place)
+        lane = chunk.take(place)
         near, far = rays.span(tree.box, slot, lane)
         met_at = np.flatnonzero(near <= np.minimum(far, t_far.take(lane)))
         codes.append(tree.child.take(slot.take(met_at)))

@@ -112,12 +112,12 @@ def _plane_numbers(triangles: Floats, ids: Ints, plane: Doubles) -> Floats:
     out = np.empty((3, ids.size), f4)
     farthest = 0.0
     for span in spans(ids.size, AT_ONCE):
-        some = plane.take(ids[span], 1)
-        some /= length(some[:3])
-        p, q, r = (row[0] * some[0] + row[1] * some[1] + row[2] * some[2] for row in ROTATION)
+        planes = plane.take(ids[span], 1)
+        planes /= length(planes[:3])
+        p, q, r = (row[0] * planes[0] + row[1] * planes[1] + row[2] * planes[2] for row in ROTATION)
         out[0, span] = p * q / width
         out[1, span] = (q * r - 0.7 * p * p) / width
-        out[2, span] = some[3] * (p + 0.6 * q + 0.3 * r)
+        out[2, span] = planes[3] * (p + 0.6 * q + 0.3 * r)
         farthest = max(farthest, float(np.abs(triangles.take(ids[span], 0)).max()))
     out[2] *= f4(1 / (width * farthest))
     return out
@@ -159,8 +159,8 @@ def _overlapping_in_runs(triangles: Floats, face: Ints, plane: Doubles, start: I
     box, strip, first, following = _in_strips(low, high, run, start, count)
     pairs = np.asarray(np.bincount(run.take(box), following, count.size), np.float64)
     dense = _beyond_budget(pairs, DENSE * face.size + BUDGET)
-    some = np.flatnonzero(dense.take(run[1:]) & (run[1:] == run[:-1]))
-    yield np.stack([face.take(some), face.take(some + 1)])
+    adjacent = np.flatnonzero(dense.take(run[1:]) & (run[1:] == run[:-1]))
+    yield np.stack([face.take(adjacent), face.take(adjacent + 1)])
     following[dense.take(run.take(box))] = 0
     ends = np.cumsum(following)
     shift = np.arange(1, box.size + 1) + following - ends  # from a number of a pair to its second place

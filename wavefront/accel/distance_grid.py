@@ -264,10 +264,10 @@ def _first_root(b: Doubles, outside: Bools) -> Doubles:
     ends = np.stack([np.zeros(lanes.size), *turns, np.ones(lanes.size)])
     sides = np.stack([outside, _cubic(b, turns[0])[0] >= 0, _cubic(b, turns[1])[0] >= 0, b[3] >= 0])
     changes = sides[1:] != sides[:-1]
-    some = np.flatnonzero(changes.any(0))
-    piece = changes.argmax(0).take(some)
-    low, high, outside = ends[piece, some], ends[piece + 1, some], sides[piece, some]
-    b, lanes = take(b, some), lanes.take(some)
+    crossed = np.flatnonzero(changes.any(0))
+    piece = changes.argmax(0).take(crossed)
+    low, high, outside = ends[piece, crossed], ends[piece + 1, crossed], sides[piece, crossed]
+    b, lanes = take(b, crossed), lanes.take(crossed)
     s = (low + high) / 2
     for _ in range(STEPS):
         value, slope = _cubic(b, s)

@@ -79,10 +79,10 @@ class EmbreeAccelerator:
         if self._curved is not None:
             rays, lanes = self._near_curved(origin, direction, exclude_prim)
             on_curved = self._curved.closest(*rays)
-            some = np.flatnonzero(on_curved.t < take(hits.t, lanes))
-            nearer = some if isinstance(lanes, slice) else lanes.take(some)
-            hits.t[nearer] = on_curved.t.take(some)
-            hits.prim[nearer] = on_curved.prim.take(some) + self._first_curved
+            closer = np.flatnonzero(on_curved.t < take(hits.t, lanes))
+            nearer = closer if isinstance(lanes, slice) else lanes.take(closer)
+            hits.t[nearer] = on_curved.t.take(closer)
+            hits.prim[nearer] = on_curved.prim.take(closer) + self._first_curved
             hits.b1[nearer] = hits.b2[nearer] = 0
         return hits
 

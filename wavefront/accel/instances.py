@@ -68,10 +68,10 @@ class InstanceAccelerator:
         excluded = self._exclude_instanced(exclude_prim)
         for lane, instance in self._rounds(origin, direction, hits.t):
             for number, at in self._by_mesh(instance):
-                lanes, some = lane.take(at), instance.take(at)
-                rays = self._local(origin, direction, excluded, lanes, some)
+                lanes, instances = lane.take(at), instance.take(at)
+                rays = self._local(origin, direction, excluded, lanes, instances)
                 mesh_hits = self._mesh(number, lanes).closest(*rays)
-                mesh_hits.prim += np.where(mesh_hits.prim >= 0, self.placements.first.take(some), 0)
+                mesh_hits.prim += np.where(mesh_hits.prim >= 0, self.placements.first.take(instances), 0)
                 _update_closest(hits, lanes, mesh_hits)
         return hits
 
@@ -82,8 +82,8 @@ class InstanceAccelerator:
         t_far = np.where(blocked, f4(-1), distance)
         for lane, instance in self._rounds(origin, direction, t_far):
             for number, at in self._by_mesh(instance):
-                lanes, some = lane.take(at), instance.take(at)
-                start, along, excluded_prim = self._local(origin, direction, excluded, lanes, some)
+                lanes, instances = lane.take(at), instance.take(at)
+                start, along, excluded_prim = self._local(origin, direction, excluded, lanes, instances)
                 met = self._mesh(number, lanes).occluded(start, along, distance.take(lanes), excluded_prim)
                 lanes = lanes.compress(met)
                 blocked[lanes] = True

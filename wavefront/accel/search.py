@@ -109,10 +109,10 @@ class PrimitiveTree:
             chosen = leaves[start : start + step]
             shape = (chosen.size, rows * size, BLOCK)
             matrices = np.take(self.tree.leaves, chosen, 0, scratch("leaves", (*shape[:2], columns)), "clip")
-            some = block_lanes[start * BLOCK : (start + chosen.size) * BLOCK]
+            chunk = block_lanes[start * BLOCK : (start + chosen.size) * BLOCK]
             rays = scratch("rays", (chosen.size, columns, BLOCK))
             for row in range(columns):
-                rays[:, row] = features[row].take(some).reshape(-1, BLOCK)
+                rays[:, row] = features[row].take(chunk).reshape(-1, BLOCK)
             products = np.matmul(matrices, rays, out=scratch("product", shape))
             value = self._primitives.values(
                 products.reshape(-1, rows, size, BLOCK), scratch("value", (chosen.size, size, BLOCK))

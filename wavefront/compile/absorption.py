@@ -175,8 +175,8 @@ def _bounds(shapes: Sequence[Shape]) -> Iterator[tuple[Ints, Doubles]]:
     """Yield the numbers (k,) of some shapes and their bounds (k, 2, 3)."""
     placed = [number for number, shape in enumerate(shapes) if isinstance(shape, Instance)]
     if placed:
-        some = [shape for shape in shapes if isinstance(shape, Instance)]
-        yield np.array(placed), instance_bounds(some)
+        instances = [shape for shape in shapes if isinstance(shape, Instance)]
+        yield np.array(placed), instance_bounds(instances)
     others = [number for number, shape in enumerate(shapes) if not isinstance(shape, Instance)]
     if others:
         yield np.array(others), np.stack([shapes[number].bounds for number in others])

@@ -40,7 +40,7 @@ class CurvedTable:
         for shape in shapes[:still]:
             members.setdefault(kind_of(shape), []).append(shape)
         groups = [*members.items(), *((kind_of(shape), [shape]) for shape in shapes[still:])]
-        kinds = tuple(kind.from_shapes(some, center) for kind, some in groups)
+        kinds = tuple(kind.from_shapes(group, center) for kind, group in groups)
         ends = np.cumsum([len(kind) for kind in kinds], dtype=np.intp)
         colors = None
         if any(shape.colors is not None for shape in shapes):
@@ -61,9 +61,9 @@ class CurvedTable:
             return self.kinds[0].surface(prim, point, error)
         normal = np.empty_like(point)
         for kind, lanes, number in self._by_kind(prim):
-            some, bound = take(point, lanes), take(error, lanes)
-            put(normal, lanes, kind.surface(number, some, bound))
-            put(point, lanes, some)
+            points, bound = take(point, lanes), take(error, lanes)
+            put(normal, lanes, kind.surface(number, points, bound))
+            put(point, lanes, points)
             error[lanes] = bound
         return normal
 

@@ -263,10 +263,10 @@ def media_table(
     records: list[MediumRecord] = []
     record_of, column_of = np.zeros(len(media), np.intp), np.zeros(len(media), np.intp)
     for place, kind in enumerate(kinds):
-        some = [index for index, medium in enumerate(media) if type(medium) is kind]
-        kind_records = [media[index].record(center) for index in some]
+        indices = [index for index, medium in enumerate(media) if type(medium) is kind]
+        kind_records = [media[index].record(center) for index in indices]
         records.append(type(kind_records[0]).concatenate(kind_records))
-        record_of[some], column_of[some] = place, np.arange(len(some))
+        record_of[indices], column_of[indices] = place, np.arange(len(indices))
     boxes = [shape.bounds for shape in shapes if shape.material.encloses]
     return MediaTable(
         entry_of=entry_of,

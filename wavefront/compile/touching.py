@@ -70,7 +70,7 @@ def find_touching(triangles: Floats, shape: Ints, material: Ints, holds: Bools) 
         material.take(face),
         (normal / length(normal)).astype(f4),
         members,
-        tuple(NumpyAccelerator(Geometry(triangles.take(face.take(some), 0))) for some in members),
+        tuple(NumpyAccelerator(Geometry(triangles.take(face.take(places), 0))) for places in members),
     )
 
 

@@ -161,8 +161,8 @@ class Picture:
         """Add the light of paths from lights of a wave, sample by sample."""
         first, number = wave.view.first_sample + wave.first_sample, splats.path // wave.pixels.size
         for sample in range(wave.samples):
-            some = splats.take(np.flatnonzero(number == sample))
-            sums.add(first + sample, wave.pixels.size, some.pixel, some.radiance)
+            splats_of_sample = splats.take(np.flatnonzero(number == sample))
+            sums.add(first + sample, wave.pixels.size, splats_of_sample.pixel, splats_of_sample.radiance)
 
     def counts(self) -> dict[str, Any]:
         """Return numbers of samples and rays, for the metadata of the picture."""

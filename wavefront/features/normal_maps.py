@@ -85,11 +85,11 @@ def _folded(shade: Shading, sample: BsdfSample, direction: Floats) -> tuple[Bsdf
     direction[:, lanes] = mirrored_at_surface(surface.ng.take(lanes, 1), direction.take(lanes, 1))
     wi[:, lanes] = shade.frame.take(lanes).to_local(direction.take(lanes, 1))
     twice, image = folded_onto(surface, shade.frame, wi)
-    some = np.flatnonzero(~take(sample.specular, twice) & (pdf.take(twice) > 0))
-    if some.size:
-        twice = twice.take(some)
+    valid = np.flatnonzero(~take(sample.specular, twice) & (pdf.take(twice) > 0))
+    if valid.size:
+        twice = twice.take(valid)
         # the direction that could have been drawn, too
-        other = np.where(wrong.take(twice), wi.take(twice, 1), image.take(some, 1))
+        other = np.where(wrong.take(twice), wi.take(twice, 1), image.take(valid, 1))
         f, more = shade.at(twice).evaluate_unfolded(other)
         one, both = pdf.take(twice), pdf.take(twice) + more
         weight[:, twice] = (weight.take(twice, 1) * one + f * np.abs(other[2])) / both

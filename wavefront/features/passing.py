@@ -16,8 +16,8 @@ class Passing(Feature):
     @classmethod
     def of(cls, facts: Facts) -> Self | None:
         """Return the feature of a scene with surfaces that rays may pass, or with media."""
-        some = [*facts.features, *facts.user_features]
-        needed = any(acts(feature, point) for feature in some for point in ("passable", "walk"))
+        features = [*facts.features, *facts.user_features]
+        needed = any(acts(feature, point) for feature in features for point in ("passable", "walk"))
         return cls() if needed else None
 
     def fly(self, leg: Leg) -> None:

@@ -50,15 +50,15 @@ class RoundSurfaces(Surfaces):
         lanes = lanes[feature.curved.take(prim)]
         if not lanes.size:
             return lift
-        some = hits.take(lanes)
-        assert some.b1 is not None
-        assert some.b2 is not None
-        weights = (f4(1) - some.b1 - some.b2, some.b1, some.b2)
+        met = hits.take(lanes)
+        assert met.b1 is not None
+        assert met.b2 is not None
+        weights = (f4(1) - met.b1 - met.b2, met.b1, met.b2)
         side = np.where(surface.back_facing.take(lanes), f4(-1), f4(1))
-        k = feature.heights.take(some.prim, 1)
+        k = feature.heights.take(met.prim, 1)
         assert scene.corner_normals is not None
         total = np.zeros((3, lanes.size), f4)
-        for corner, normal in enumerate(at_corners(scene.corner_normals, some, scene.triangles)):
+        for corner, normal in enumerate(at_corners(scene.corner_normals, met, scene.triangles)):
             one, other = (weights[vertex] for vertex in range(3) if vertex != corner)
             below = side * (one * k[2 * corner] + other * k[2 * corner + 1])  # of the plane at the vertex
             total += normal * (weights[corner] * side * np.maximum(-below, f4(0)))

@@ -81,15 +81,15 @@ class Sharing:
         begun, hits = as_shared(paths.take(lanes), light.shape[1]), hits.take(lanes)
         ways = [(way, hits.take(slice(0, matte))) for way in copies(begun.take(slice(0, matte)), SHARED_WAYS)]
         ways = self._step(ways, 1, light)
-        some, glossy = slice(matte, lanes.size), None
+        rest, glossy = slice(matte, lanes.size), None
         if g:
-            glossy, more = self._glossy(begun.take(some), hits.take(some), light)
+            glossy, more = self._glossy(begun.take(rest), hits.take(rest), light)
             ways += more
         self._follow(ways, 2, light)
         sums = [(L, light), *first.recorder.parts_of_shared()]
         for to, shared in sums:
             shared[:, :matte] *= f4(1 / SHARED_WAYS)
-            add_to_slots(to, points.slot[some], points.throughput[:, some] * shared[:, lanes.size :][:, :g])
+            add_to_slots(to, points.slot[rest], points.throughput[:, rest] * shared[:, lanes.size :][:, :g])
         add_shared(self.scene, sums, first, shade, points, tiles, self.scene.program.branches, glossy)
 
     def _glossy(self, paths: Paths, hits: Hits, light: Floats) -> tuple[GlossyPoints, Ways]:

@@ -197,7 +197,7 @@ def li_twins(scene: CompiledScene, paths: Paths, sampler: Sampler, max_bounces: 
         if bounce == 0:
             other, through = paths.sample + samples, paths.throughput.copy()
             twins.append(replace(paths, slot=paths.slot + n, sample=other, throughput=through))
-        paths = Paths.concatenate([scatter(scene, L, some, hits, sampler, bounce) for some in twins])
+        paths = Paths.concatenate([scatter(scene, L, twin, hits, sampler, bounce) for twin in twins])
     return L
 
 

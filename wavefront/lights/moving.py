@@ -84,8 +84,8 @@ class MovingLights(LightRecord):
         """Return the radiance, (3, n), at the times of the surfaces."""
         matrix = self._matrix(None if surface is None else surface.time, wi.shape[1])
         toward = normalize(turned(matrix, wi)).astype(f4)
-        some = None if surface is None or not np.any(self.lights.varies) else surface
-        radiance: Floats = self.lights.le(toward, some)
+        textured = None if surface is None or not np.any(self.lights.varies) else surface
+        radiance: Floats = self.lights.le(toward, textured)
         return radiance
 
     def power(self, scene_radius: float) -> Doubles:
@@ -97,13 +97,13 @@ class MovingLights(LightRecord):
         """Return the most that the lights bring at some times while the shutter is open, (c, k)."""
         most, cells = np.zeros((center.shape[1], len(self))), center.shape[1]
         for number in distinct(self.number):
-            some = np.flatnonzero(self.number == number)
-            light = self.lights.take(some)
+            columns = np.flatnonzero(self.number == number)
+            light = self.lights.take(columns)
             for time in self.motions.times(TIMES):
                 matrix = self.motions.at(np.full(cells, number), np.full(cells, time))
                 near = radius * float(_scale(matrix[:, :1])[0])
                 irradiance = light.irradiance(applied(matrix, center), near, scene_radius)
-                most[:, some] = np.maximum(most[:, some], irradiance)
+                most[:, columns] = np.maximum(most[:, columns], irradiance)
         return most
 
     def emitters(self) -> Emitters | None:
@@ -164,9 +164,9 @@ class DeformingLights(LightRecord):
 
     def le(self, wi: Floats, surface: SurfaceInteraction | None = None) -> Floats:
         """Return the radiance, (3, n), at the times of the surfaces."""
-        some = None if surface is None or not np.any(self.lights.varies) else surface
+        textured = None if surface is None or not np.any(self.lights.varies) else surface
         light = self._at(None if surface is None else surface.time, wi.shape[1])
-        radiance: Floats = light.le(wi, some)
+        radiance: Floats = light.le(wi, textured)
         return radiance
 
     def power(self, scene_radius: float) -> Doubles:

@@ -52,12 +52,12 @@ class RectangleLights(PlanarLights):
         height = self._facing(self._rise(point))
         pdfs = []
         for lanes, seen, warp in self._near(point, height):
-            some, density = u.take(lanes, 1), seen.pdf()
+            numbers, density = u.take(lanes, 1), seen.pdf()
             if warp is not None:
-                some, over_square = linear_with_density(some, warp)
+                numbers, over_square = linear_with_density(numbers, warp)
                 density *= over_square
             pdfs.append((lanes, density))
-            put(wi, lanes, seen.sample(some))
+            put(wi, lanes, seen.sample(numbers))
         d2 = dot(wi, wi)
         distance = np.sqrt(d2 + LEAST_SQUARE)
         wi /= distance
@@ -105,9 +105,9 @@ class RectangleLights(PlanarLights):
         low = np.flatnonzero((height > ON * width) & (height < ROOT_NEAR * width))
         if not low.size:
             return
-        some = self._at(low)
-        away = some._middle() - point.take(low, 1)
-        near = low.compress(dot(away, away) < NEAR * some.area)
+        lights = self._at(low)
+        away = lights._middle() - point.take(low, 1)
+        near = low.compress(dot(away, away) < NEAR * lights.area)
         above = height.take(near) > f4(high) * (width if width.size == 1 else width.take(near))
         for lanes, dtype in ((near.compress(above), np.float32), (near.compress(~above), np.float64)):
             if lanes.size:
@@ -121,11 +121,11 @@ class RectangleLights(PlanarLights):
         self, point: Floats, lanes: Ints, dtype: type[np.floating]
     ) -> tuple[SphericalRectangle, Floats | None]:
         """Return rectangles as seen from the points (3, k) of some lanes, and the slopes of densities."""
-        some = self._at(lanes)
+        lights = self._at(lanes)
         if self.receiver is not None:
-            some = some.lighting(self.receiver if len(self.receiver) == 1 else self.receiver.take(lanes))
-        seen = SphericalRectangle.of(some.corner - point, some.edge_u, some.edge_v, dtype)
-        return seen, some._slopes(some._middle() - point, near=True)
+            lights = lights.lighting(self.receiver if len(self.receiver) == 1 else self.receiver.take(lanes))
+        seen = SphericalRectangle.of(lights.corner - point, lights.edge_u, lights.edge_v, dtype)
+        return seen, lights._slopes(lights._middle() - point, near=True)
 
 
 @soa

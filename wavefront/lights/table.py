@@ -183,7 +183,7 @@ class LightTable:
         radiance = np.empty_like(wi)
         put(radiance, lanes, self.texels.le_of_texels(take(wi, lanes), pdf.take(lanes)))
         radiance_others = self.le(
-            light.take(others), take(wi, others), surface_at and (lambda some: surface_at(others.take(some)))
+            light.take(others), take(wi, others), surface_at and (lambda at: surface_at(others.take(at)))
         )
         put(radiance, others, radiance_others)
         return radiance

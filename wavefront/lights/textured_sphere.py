@@ -62,10 +62,10 @@ def mean_sphere_radiance(shape: Any) -> Floats:
         count = 1
     colors = np.ones((4, count), f4) if shape.colors is None else shape.colors[:count].T.astype(f4)
     mean = np.empty((3, count), f4)
-    for some in spans(count, max(1, MOST_SAMPLES // n)):
-        k = colors[:, some].shape[1]
-        value = emission_at(emission, _seen(np.tile(normal, k), np.repeat(colors[:, some], n, 1)))
-        mean[:, some] = np.broadcast_to(value, (3, k * n)).reshape(3, k, n).mean(2, dtype=np.float64)
+    for span in spans(count, max(1, MOST_SAMPLES // n)):
+        k = colors[:, span].shape[1]
+        value = emission_at(emission, _seen(np.tile(normal, k), np.repeat(colors[:, span], n, 1)))
+        mean[:, span] = np.broadcast_to(value, (3, k * n)).reshape(3, k, n).mean(2, dtype=np.float64)
     return np.broadcast_to(mean, (3, shape.count))
 
 

@@ -144,8 +144,8 @@ class HomogeneousMedia(MediumRecord):
         chosen = chosen_channel(extinction, shares, u[0])
         # where nothing is scattered, nothing is chosen either
         chosen *= highest(scattering) > 0
-        some = chosen > 0
-        t = np.where(some, -log(f4(1) - u[1]) / np.where(some, chosen, f4(1)), f4(np.inf))
+        scatters = chosen > 0
+        t = np.where(scatters, -log(f4(1) - u[1]) / np.where(scatters, chosen, f4(1)), f4(np.inf))
         met = t < rays.length
         through = transmitted(extinction, np.where(met, t, rays.length))
         density = shares * through * np.where(met, extinction, f4(1))

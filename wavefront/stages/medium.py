@@ -37,16 +37,16 @@ def fly(leg: Leg, lanes: Ints, segment: int) -> Ints:
     if not inside.size:
         return lanes
     reached = np.ones(lanes.size, np.bool_)
-    medium, some = medium.take(inside), lanes.take(inside)
+    medium, inner = medium.take(inside), lanes.take(inside)
     if media.only_absorbs:
-        length = take(hits.t, some)
-        paths.throughput[:, some] *= _through(media, paths, some, medium, length, None)
+        length = take(hits.t, inner)
+        paths.throughput[:, inner] *= _through(media, paths, inner, medium, length, None)
         return lanes
-    address = take(paths.pixel, some), take(paths.sample, some), leg.bounce, Dimension.MEDIUM + segment
+    address = take(paths.pixel, inner), take(paths.sample, inner), leg.bounce, Dimension.MEDIUM + segment
     u = sampler.draw_2d(*address)
     steps = StepNumbers.of(sampler.seed, *address) if media.takes_steps else None
     for record, rows, column in media.by_record(medium):
-        at = some.take(rows)
+        at = inner.take(rows)
         throughput, length = take(paths.throughput, at), take(hits.t, at)
         rays = _within(column, paths, at, length, None if steps is None else steps.take(rows))
         weights = _glow_weights(scene, paths, at, medium.take(rows)) if leg.mis else None
@@ -128,8 +128,8 @@ def transmitted(
     medium, passed = media.medium_in(stack), np.ones_like(rays.direction)
     inside = np.flatnonzero(medium >= 0)
     if inside.size:
-        some = None if steps is None else steps.take(inside)
-        passed[:, inside] = _through(media, rays, inside, medium.take(inside), length.take(inside), some)
+        numbers = None if steps is None else steps.take(inside)
+        passed[:, inside] = _through(media, rays, inside, medium.take(inside), length.take(inside), numbers)
     return passed
 
 
@@ -139,8 +139,8 @@ def _through(
     """Return the transmittance (3, k) over lengths (k,) of some lanes of rays in their media."""
     transmittance = np.empty((3, lanes.size), f4)
     for record, rows, column in media.by_record(medium):
-        some = None if steps is None else steps.take(rows)
-        within = _within(column, rays, lanes.take(rows), length.take(rows), some)
+        numbers = None if steps is None else steps.take(rows)
+        within = _within(column, rays, lanes.take(rows), length.take(rows), numbers)
         transmittance[:, rows] = record.transmittance(within)
     return transmittance
 
@@ -200,13 +200,13 @@ def _crossing_of_other(
     for of_layer, (members, accelerator) in enumerate(
         zip(touching.members, touching.accelerators, strict=True)
     ):
-        some = np.flatnonzero(layer != of_layer)
-        hits = accelerator.closest(take(start, some), -take(here.wo, some), np.full(some.size, -1))
+        others = np.flatnonzero(layer != of_layer)
+        hits = accelerator.closest(take(start, others), -take(here.wo, others), np.full(others.size, -1))
         met = members.take(hits.prim)
-        near = (hits.prim >= 0) & (hits.t < f4(2) * before.take(some))
-        near &= touching.group.take(met) == group.take(some)
-        some, met = some.compress(near), met.compress(near)
-        opposite = dot(touching.front.take(met, 1), touching.front.take(number.take(some), 1)) < 0
-        back_facing = here.back_facing.take(some) ^ opposite
-        other[lanes.take(some)] = scene.media.crossing(touching.material.take(met), back_facing)
+        near = (hits.prim >= 0) & (hits.t < f4(2) * before.take(others))
+        near &= touching.group.take(met) == group.take(others)
+        others, met = others.compress(near), met.compress(near)
+        opposite = dot(touching.front.take(met, 1), touching.front.take(number.take(others), 1)) < 0
+        back_facing = here.back_facing.take(others) ^ opposite
+        other[lanes.take(others)] = scene.media.crossing(touching.material.take(met), back_facing)
     return other

@@ -87,8 +87,8 @@ def shared_points(
     if scene.program.weaken:
         good &= ~surface.back_facing
     matte = matte.take(lanes)
-    some = np.concatenate([np.flatnonzero(good & matte), np.flatnonzero(good & ~matte)])
-    lanes, surface = lanes.take(some), surface.take(some)
+    order = np.concatenate([np.flatnonzero(good & matte), np.flatnonzero(good & ~matte)])
+    lanes, surface = lanes.take(order), surface.take(order)
     way = (take(paths.sample, lanes) % np.uint32(branches)).astype(np.intp)
     points = SharedPoints(
         take(paths.slot, lanes),
@@ -160,18 +160,18 @@ def add_shared(
     plain = own_cosine and all(bsdf.lambertian for _, bsdf in lit.groups)
     albedo = lit.albedo() if plain else None
     received = [np.zeros((3, slot.size), f4) for _ in sums]
-    for some in spans(tiles.count, TILES_AT_ONCE):
-        first = FirstPoints.of(lit, albedo, lane_in[:, some], paths.media)
+    for span in spans(tiles.count, TILES_AT_ONCE):
+        first = FirstPoints.of(lit, albedo, lane_in[:, span], paths.media)
         if first is None:
             continue
-        numbers = [numbers[:, some] for numbers in number_in]
+        numbers = [numbers[:, span] for numbers in number_in]
         received_here, lost = _arriving(scene, first, points, lights, numbers, glossy)
         for number in filter(len, lost):  # they stay the path's own
             for L, light in sums:
                 leaving = _leaving(scene, light, number, matte, glossy)
                 L[:, points.slot.take(number)] += take(points.throughput, number) * leaving
         cells = np.flatnonzero(first.present)
-        lanes = lane_in[:, some].reshape(-1).take(cells)
+        lanes = lane_in[:, span].reshape(-1).take(cells)
         for values, arriving in zip(received, received_here, strict=True):
             values[:, lanes] = arriving.reshape(3, -1).take(cells, 1)
     for (L, _), values in zip(sums, received, strict=True):
@@ -183,14 +183,14 @@ def _leaving(
 ) -> Floats:
     """Return the light that leaves points, the first k of them matte, towards their own paths."""
     leaving = take(light, number)
-    some = np.flatnonzero(number >= k)
-    if glossy is not None and some.size:
-        at = number.take(some)
+    shiny = np.flatnonzero(number >= k)
+    if glossy is not None and shiny.size:
+        at = number.take(shiny)
         shade = glossy.toward(at - k)
         f, pdf = glossy.of_next(at - k, shade)
         f /= np.where(pdf > 0, pdf, f4(1))
         arriving = glossy.of_samples(scene, at - k, shade) * take(light, at)
-        leaving[:, some] = arriving + f * take(light, at + 2 * glossy.pdf.size)
+        leaving[:, shiny] = arriving + f * take(light, at + 2 * glossy.pdf.size)
     return leaving
 
 
@@ -263,11 +263,11 @@ def _add_glossy(
     at = number.take(cells % t) - matte
     wo = normalize(take(first.start.reshape(3, -1), cells) - take(points.point, at + matte))
     for by_samples, lit in zip((True, False), arrives, strict=True):
-        some = np.flatnonzero(lit.take(at))
-        if not some.size:
+        chosen = np.flatnonzero(lit.take(at))
+        if not chosen.size:
             continue
-        cell, which = cells.take(some), at.take(some)
-        shade = glossy.toward(which, take(wo, some))
+        cell, which = cells.take(chosen), at.take(chosen)
+        shade = glossy.toward(which, take(wo, chosen))
         share = weight.reshape(-1, t * MEMBERS).take(cell, 1)
         if by_samples:
             f, column = glossy.of_samples(scene, which, shade), matte

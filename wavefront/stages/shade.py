@@ -330,19 +330,19 @@ def radiance_at_samples(
     if light.prim is None:
         return radiance
     prim = light.prim.take(lanes)
-    some = np.flatnonzero(prim >= 0)
-    if not some.size:
+    on_surface = np.flatnonzero(prim >= 0)
+    if not on_surface.size:
         return radiance
-    at, rays = lanes.take(some), rays.take(some)
+    at, rays = lanes.take(on_surface), rays.take(on_surface)
     assert light.b1 is not None
     assert light.b2 is not None
     surface = interaction(
-        scene, rays, Hits(rays.distance, prim.take(some), light.b1.take(at), light.b2.take(at))
+        scene, rays, Hits(rays.distance, prim.take(on_surface), light.b1.take(at), light.b2.take(at))
     )
-    sent = scene.lights.le(number.take(some), rays.direction, surface.take)
+    sent = scene.lights.le(number.take(on_surface), rays.direction, surface.take)
     radiance = radiance.copy()
     if scene.program.see_through:
         unhidden = replace(rays, media=None)  # media around it hide no surface from samples on it
         sent = sent * opacities_at(Passage(scene, unhidden, surface, None, 0), scene.program.see_through)
-    radiance[:, some] = sent
+    radiance[:, on_surface] = sent
     return radiance

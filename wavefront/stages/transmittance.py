@@ -33,8 +33,8 @@ def transmittance_along(scene: CompiledScene, rays: ShadowRays, veils: Veils | N
     seen = ~(blocked | perhaps)
     for dim in scene.program.dim:
         free = np.flatnonzero(seen)
-        some, left = rays.take(free), take(transmittance, free)
-        dim(left, scene, some, some.distance, np.ones(free.size, np.bool_))
+        free_rays, left = rays.take(free), take(transmittance, free)
+        dim(left, scene, free_rays, free_rays.distance, np.ones(free.size, np.bool_))
         transmittance[:, free] = left
     lanes = np.flatnonzero(perhaps)
     if not veils:

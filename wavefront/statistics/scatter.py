@@ -101,20 +101,20 @@ def sums_by_label(
         that variance² / spread are those of the whole (F. E. Satterthwaite, An Approximate Distribution of
         Estimates of Variance Components, 1946).
     """
-    some = np.flatnonzero(label.ravel() >= 0)
-    where = label.ravel().take(some)
-    error = standard_error.reshape(-1, 3)[some].astype(np.float64)
+    pixels = np.flatnonzero(label.ravel() >= 0)
+    where = label.ravel().take(pixels)
+    error = standard_error.reshape(-1, 3)[pixels].astype(np.float64)
     variance, spread, unshared = np.zeros((labels, 3)), np.zeros((labels, 3)), np.ones_like(error)
     for group in scatter:
-        deviations = group.deviations.reshape(-1, *group.deviations.shape[2:])[some] / np.float64(UNIT)
+        deviations = group.deviations.reshape(-1, *group.deviations.shape[2:])[pixels] / np.float64(UNIT)
         unshared -= np.square(deviations).sum(1)
         deviations *= error[:, None]
-        shared, tile = _by_tile(deviations, group.tile.ravel()[some], where)
+        shared, tile = _by_tile(deviations, group.tile.ravel()[pixels], where)
         _add_to(variance, tile, shared[0])
         _add_to(spread, tile, shared[1])
     alone = np.square(error) * np.where(unshared > ROUNDING, unshared, 0)
     _add_to(variance, where, alone)
-    _add_to(spread, where, np.square(alone) / freedom.ravel()[some, None])
+    _add_to(spread, where, np.square(alone) / freedom.ravel()[pixels, None])
     return variance, spread
 
 

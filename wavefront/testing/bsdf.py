@@ -276,20 +276,20 @@ def _check_samples(report: Report, view: _View, drawn: BsdfSample) -> None:
         report.holds("finite", f"{where}, {name}", ~np.isfinite(values), "finite numbers")
     report.holds("not negative", f"{where}, weight", drawn.weight < 0, "at least 0")
     report.holds("not negative", f"{where}, pdf", drawn.pdf < 0, "at least 0")
-    some = drawn.pdf > 0
-    carries = some & (drawn.weight > 0).any(0)
-    report.holds("pdf 0 has no weight", where, ~some & (drawn.weight > 0).any(0), "weight 0")
-    size = np.sqrt((drawn.wi[:, some].astype(np.float64) ** 2).sum(0))
+    possible = drawn.pdf > 0
+    carries = possible & (drawn.weight > 0).any(0)
+    report.holds("pdf 0 has no weight", where, ~possible & (drawn.weight > 0).any(0), "weight 0")
+    size = np.sqrt((drawn.wi[:, possible].astype(np.float64) ** 2).sum(0))
     report.at_most("unit length", where, float(np.abs(size - 1).max(initial=0)), 1e-5)
     if not view.bsdf.transmissive:
         report.holds("no transmission", where, carries & (drawn.wi[2] < 0), "wi above the surface")
     elif drawn.eta is not None:
-        above = some & (drawn.wi[2] > 0) & (drawn.eta != 1)
+        above = possible & (drawn.wi[2] > 0) & (drawn.eta != 1)
         report.holds("eta", where, above | ~(drawn.eta > 0), "1 above, more than 0 below")
     if view.bsdf.specular:
-        report.holds("specular samples", where, some & ~drawn.specular, "all specular")
+        report.holds("specular samples", where, possible & ~drawn.specular, "all specular")
     report.holds("delta probability", where, drawn.specular & (drawn.pdf > 1 + 1e-6), "at most 1")
-    lanes = np.flatnonzero(some & ~drawn.specular)[: 1 << 16]
+    lanes = np.flatnonzero(possible & ~drawn.specular)[: 1 << 16]
     if not len(lanes):
         return
     wi = np.ascontiguousarray(drawn.wi[:, lanes])

@@ -149,21 +149,21 @@ def _check_light_samples(
         report.holds("finite", f"{where}, {name}", ~np.isfinite(values), "finite numbers")
     report.holds("not negative", f"{where}, radiance", drawn.radiance < 0, "at least 0")
     report.holds("not negative", f"{where}, pdf", drawn.pdf < 0, "at least 0")
-    some = drawn.pdf > 0
-    if not some.any():
+    possible = drawn.pdf > 0
+    if not possible.any():
         return
-    wi = np.ascontiguousarray(drawn.wi[:, some])
+    wi = np.ascontiguousarray(drawn.wi[:, possible])
     size = np.sqrt((wi.astype(np.float64) ** 2).sum(0))
     report.at_most("unit length", where, float(np.abs(size - 1).max()), 1e-5)
-    short = float(np.mean(~(drawn.distance[some] > 0)))
+    short = float(np.mean(~(drawn.distance[possible] > 0)))
     report.at_most("distance not above 0", where, short, 1e-3)
     pdf, le = density(wi), radiance(wi)
     if light.delta:
-        report.holds("delta pdf", where, drawn.pdf[some] != 1, "1")
+        report.holds("delta pdf", where, drawn.pdf[possible] != 1, "1")
         report.holds("delta pdf_li, le", where, (pdf != 0) | (le != 0).any(0), "0")
         return
     # Rays to samples on the edge of a light may miss it, so a few lanes may differ.
-    ratio = np.abs(pdf - drawn.pdf[some]) > 1e-3 * drawn.pdf[some]
+    ratio = np.abs(pdf - drawn.pdf[possible]) > 1e-3 * drawn.pdf[possible]
     report.at_most("sample pdf ≠ pdf_li", where, float(ratio.mean()), 1e-3)
-    differs = (np.abs(le - drawn.radiance[:, some]) > 1e-4 * np.maximum(le, 1e-20)).any(0)
+    differs = (np.abs(le - drawn.radiance[:, possible]) > 1e-4 * np.maximum(le, 1e-20)).any(0)
     report.at_most("radiance ≠ le", where, float(differs.mean()), 1e-3)

@@ -103,8 +103,8 @@ class DisneySolid(DisneyBase):
         f = np.where(front > 0, tinted, clear * reflected) * value
         above = np.where(wi[2] > 0, front, f4(0))
         # Mitsuba evaluates the sheen where there is a diffuse base
-        some = (f4(1) - self.metallic) * (self.transmission < 1)
-        f = f + self.matte(wo, wi, cos) * (opaque * above) + self.fibers(cos, some) * above
+        opaque_part = (f4(1) - self.metallic) * (self.transmission < 1)
+        f = f + self.matte(wo, wi, cos) * (opaque * above) + self.fibers(cos, opaque_part) * above
         pdf = chances.gloss * density * self._chance(reflected)
         pdf = pdf + chances.diffuse * cosine_hemisphere_pdf(wi)
         if not self.transmissive:
