@@ -27,7 +27,7 @@ class Geometry:
     curved: tuple[CurvedPrimitives, ...] = ()  # spheres and others, one element per kind
     weights: bool = True  # whether barycentric weights are needed; without them b1 and b2 are 0
     # (m,) whether a triangle and the next one have the same material, light and attributes everywhere, so
-    # that either id may be reported for a hit of the flat quadrilateral that they form; None: no triangles
+    # that either id may be reported for a hit of their flat quadrilateral; None: no triangles
     interchangeable: Bools | None = None
 
     @property

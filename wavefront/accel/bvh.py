@@ -28,7 +28,7 @@ from .triangle import ROUNDOFF
 BLOCK = 32  # rays that share one copy of a node's matrix
 BLOCK_SHIFT = 5
 CHUNK = 1 << 18  # elements of one product
-AT_ONCE = 1 << 15  # primitives whose bounds are found together, so that they fit the cache
+AT_ONCE = 1 << 15  # primitives per batch: their bounds fit the cache
 NEAR_ROUNDS = 3  # rounds in which each ray visits its nearest child of the root; then it visits all others
 TOP = 128  # most children of the root: inner children are replaced by their own while these fit
 

@@ -24,8 +24,8 @@ from .triangle import AXES, ROUNDOFF, TriangleTable
 SHIFTS = 4  # one more than there are numbers of a plane
 COARSEST = 1 / 8  # the greatest width of a cell
 FLATNESS = 4 * ROUNDOFF  # largest distance from a common plane, relative to the coordinates
-AT_ONCE = 1 << 15  # faces, or pairs of them, whose numbers are made together, so that they fit the cache
-FARTHEST = 16.0  # heights of a triangle beyond it, up to which its plane is known
+AT_ONCE = 1 << 15  # faces, or pairs of them, per batch: their numbers fit the cache
+FARTHEST = 16.0  # distance beyond a triangle, in its heights, up to which its plane is precise
 # Pairs that are tested, for each face and in all. The faces of cells that have more count as overlapping:
 # they get one plane, or rays that hit them are traced twice. Both do no harm where they do not overlap.
 DENSE, BUDGET = 64, 1 << 24

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from ..arrays.vec import Bools, Floats, Ints, spans
 from .triangle import has_area
 
-AT_ONCE = 1 << 14  # triangles whose keys are made together, so that they fit the cache
+AT_ONCE = 1 << 14  # triangles per batch: their keys fit the cache
 FACTORS = tuple(map(np.uint64, (0x9E3779B97F4A7C15, 0xC2B2AE3D27D4EB4F, 0x165667B19E3779F9)))  # odd
 
 Keys = NDArray[np.uint64]

@@ -14,7 +14,7 @@ from .hits import AnyHit, Candidates, HitAccumulator
 from .primitives import Primitives, PrimitiveTests
 
 WIDTH = 32  # children of a node
-AT_ONCE = 1 << 14  # primitives whose rows are made together, so that they fit the cache
+AT_ONCE = 1 << 14  # primitives per batch: their rows fit the cache
 
 
 class PrimitiveList:

@@ -17,7 +17,7 @@ from ..arrays.soa import soa
 from ..arrays.vec import Bools, Doubles, Floats, Ints, cross, f4, spans
 
 ROUNDOFF = 2.0**-24  # half an ulp of float32
-AT_ONCE = 1 << 14  # triangles whose float64 data are made together, so that they fit the cache
+AT_ONCE = 1 << 14  # triangles per batch: their float64 data fit the cache
 LEAST_EXTENT = 1e-30  # added to the extent of points, so that no row is infinite
 # Column i: the axes that become x, y and z for rays whose largest component is along axis i.
 AXES = np.array([[1, 2, 0], [2, 0, 1], [0, 1, 2]])

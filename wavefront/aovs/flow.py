@@ -19,7 +19,7 @@ from .carried import carried
 
 FLOWS = {"flow": 1, "flow_back": 0}  # AOVs, and which of the two times each leads to
 HIDDEN = {"flow_occluded": "flow", "flow_back_occluded": "flow_back"}
-ROUNDS = 6  # in which the row is found that is read when it shows a point
+ROUNDS = 6  # iterations for the row that is read at the time when it shows a point
 NEARER = 1e-3  # by which part of its distance something must be nearer than a point to hide it
 
 # the scene as the camera meets it at a time, for rays with times if the sensor is read row by row

@@ -137,7 +137,7 @@ def _empty(name: str, pixels: int) -> NDArray[Any]:
 
 
 def pixel_spans(pixels: int) -> Iterator[tuple[slice, Words]]:
-    """Yield spans of so many pixels, and their numbers."""
+    """Yield spans of pixels, and the numbers of these."""
     for start in range(0, pixels, RAYS_AT_ONCE):
         end = min(start + RAYS_AT_ONCE, pixels)
         yield slice(start, end), np.arange(start, end, dtype=np.uint32)

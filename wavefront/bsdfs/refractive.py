@@ -1,4 +1,4 @@
-"""The parameters that clear materials have in common."""
+"""The common parameters of clear materials."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The parameters that surfaces of microfacets have in common."""
+"""The common parameters of surfaces of microfacets."""
 
 from __future__ import annotations
 

@@ -29,8 +29,8 @@ from ..shapes.instance import instance_bounds
 from .geometry import boxes_of_groups
 
 NEAR = 1e-6  # largest gap of boxes that touch, relative to their size
-MOST_PARTS = 1 << 11  # of absorbers, beyond which the table is taken without a search
-MOST_FACES = 1 << 22  # of other shapes that are searched; likewise
+MOST_PARTS = 1 << 11  # of absorbers; with more, the table is taken without a search
+MOST_FACES = 1 << 22  # of other shapes; likewise
 
 
 @soa

@@ -18,9 +18,9 @@ from ..shapes import Instance, Mesh, Shape, Spheres
 from ..shapes.transform import is_even
 from .motion import Exposed, Mover
 
-TIMES = 9  # while the shutter is open, at which it is looked where things are
-MOST_STEPS = 16  # in which a deformation that is not given by lines is approximated by some
-STRAIGHT = 2.0**-12  # distance from such a line, relative to the shape, that does not matter
+TIMES = 9  # samples of the time while the shutter is open
+MOST_STEPS = 16  # linear steps that approximate a deformation at most
+STRAIGHT = 2.0**-12  # tolerance of such steps, relative to the shape
 FORMS = 33  # of an emitting mesh whose transform does not keep its shape
 EVEN = 1e-5  # relative difference of scales along two axes that does not matter for light
 

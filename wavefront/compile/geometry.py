@@ -9,7 +9,7 @@ import numpy as np
 from ..arrays.vec import Bools, Doubles, Floats, Ints, cross, f4, length, spans
 from ..shapes import Mesh
 
-AT_ONCE = 1 << 14  # triangles that are made in float64 together, so that they fit the cache
+AT_ONCE = 1 << 14  # triangles per batch: their float64 data fit the cache
 
 
 def boxes_of_groups(low: Doubles, high: Doubles, group: Ints, count: int) -> tuple[Doubles, Doubles]:

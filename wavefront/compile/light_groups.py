@@ -123,7 +123,7 @@ class GroupNumbers:
         return self._by(lambda key: key.efficacy)
 
     def _by(self, name_of: Callable[[LightKey], K]) -> LightGroups[K]:
-        """Return the groups of lights of which `name_of` tells the same name."""
+        """Return the groups of lights by their names, as `name_of` gives them."""
         names = tuple(dict.fromkeys(map(name_of, self._numbers)))
         group = np.array([names.index(name_of(key)) for key in self._numbers], np.intp)
         of_light = group.take(np.concatenate([np.zeros(0, np.intp), *self._of_light]))

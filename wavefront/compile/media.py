@@ -131,7 +131,7 @@ class MediaTable:
         return np.where(self.nested.take(entry), self.index.take(around), f4(1))
 
     def holding(self, light: Ints, lights: int) -> Ints:
-        """Return the media (n,) that lights (n,), of so many `lights`, are samples of; -1 for none."""
+        """Return the media (n,) whose emission lights (n,) sample, of `lights` in all; -1 for none."""
         medium = np.full(lights + 1, -1)
         medium[self.light_of] = np.arange(len(self.light_of))
         medium[-1] = -1

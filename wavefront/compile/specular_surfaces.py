@@ -32,8 +32,8 @@ class SpecularSurfaces:
     """The specular surfaces of a scene: its triangles and spheres whose materials have only delta lobes."""
 
     of_prim: Bools  # (m + k + 1,) whether each primitive id is one; False at the end, for others and a miss
-    # (m + k,) the lowest primitive id that a ray may find where it hits each primitive: that of the first
-    # triangle of a flat quadrilateral, or its own
+    # (m + k,) the lowest primitive id that a ray may report for a hit of each: that of the first triangle
+    # of a flat quadrilateral, or its own
     found_as: Ints
     prim: Ints  # (c,) their primitive ids, triangles first
     corners: Floats  # (t, 3, 3) of the triangles

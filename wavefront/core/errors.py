@@ -19,7 +19,7 @@ from .suggestions import did_you_mean
 PACKAGE = os.path.join(os.path.dirname(os.path.dirname(__file__)), "")
 MOST_LETTERS = 120  # of a value in a message
 _listener: ContextVar[Callable[[str], None] | None] = ContextVar("listener", default=None)
-BEGIN, END = 1500, 500  # letters at both ends of a message that is kept where it is longer
+BEGIN, END = 1500, 500  # letters that are kept at both ends of a longer message
 
 
 def printable(text: str) -> str:
@@ -192,7 +192,7 @@ def in_brief(value: Any) -> str:
 
 
 def exact(value: Any) -> str:
-    """Return a number with as many digits as tell it from all others of its type, and no more."""
+    """Return a number with the fewest digits that tell it from all others of its type."""
     text = f"{value:g}"
     return text if np.asarray(value).dtype.type(float(text)) == value else str(value)
 

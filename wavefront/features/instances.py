@@ -43,7 +43,7 @@ class InstancedSurfaces(Surfaces):
         return np.where(replaced >= 0, replaced, rows)
 
     def prims(self) -> Ints:
-        """Return primitive ids, which tell instances apart."""
+        """Return primitive ids, which differ between instances."""
         prim = super().prims()
         return prim if self.instances is None else prim + self.instances.shift
 

@@ -14,12 +14,12 @@ from .tree import compact_order
 
 MOST_CELLS = 2400
 MOST_ENTRIES = 2**21  # cells times lights, and cells times orientations times groups of lights
-AT_ONCE = 2**16  # such entries that are computed together, so that they fit the cache
+AT_ONCE = 2**16  # entries per batch: they fit the cache
 FEW = 4  # bits of the number of groups, for as many lights; more are gathered in groups
 MOST_BITS = 5  # of the number of a light in its group
 BY_POWER = 0.05  # part of the probability that is proportional to power, so that no light is left out
 ORIENTATIONS = 27  # -1, 0 or 1 along each axis
-ANY = ORIENTATIONS // 2  # that of surfaces that light reaches from both sides, or that are not known
+ANY = ORIENTATIONS // 2  # orientation of surfaces that are lit from both sides, or unknown
 SLANTED = f4(0.38)  # sin 22.5°: from here on a component counts
 SPREAD = 0.93  # mean cosine between normals and the middle of their orientation
 LEAST_SPREAD = 1e-3  # of directions, so that lights near the horizon get a share

@@ -1,6 +1,6 @@
 """Lights that move while a shutter is open: each is sampled in its place at the time of the path.
 
-The `Receiver` tells the time. A density in solid angle is that of the light as it is
+The time is that of the `Receiver`. A density in solid angle is that of the light as it is
 then, so it stays exact.
 """
 
@@ -18,7 +18,7 @@ from ..motion.steps import Motions, applied, moved_back, step_at, transposed_tur
 from .base import Emitters, LightRecord, LightSample, Receiver
 from .planar import PlanarLights
 
-TIMES = 9  # while the shutter is open, at which the choice of a light knows where they are
+TIMES = 9  # samples of the time while the shutter is open, for the choice of a light
 
 
 @soa
@@ -94,7 +94,7 @@ class MovingLights(LightRecord):
         return np.asarray(self.lights.power(scene_radius) / scale**2)
 
     def irradiance(self, center: Doubles, radius: float, scene_radius: float) -> Doubles:
-        """Return the most that the lights bring at some times while the shutter is open, (c, k)."""
+        """Return the greatest irradiance at some times while the shutter is open, (c, k)."""
         most, cells = np.zeros((center.shape[1], len(self))), center.shape[1]
         for number in distinct(self.number):
             columns = np.flatnonzero(self.number == number)
@@ -174,7 +174,7 @@ class DeformingLights(LightRecord):
         return np.max([light.power(scene_radius) for light in self._stills()], 0)
 
     def irradiance(self, center: Doubles, radius: float, scene_radius: float) -> Doubles:
-        """Return the most that the lights bring at some times while the shutter is open, (c, k)."""
+        """Return the greatest irradiance at some times while the shutter is open, (c, k)."""
         return np.max([still.irradiance(center, radius, scene_radius) for still in self._stills()], 0)
 
     def emitters(self) -> Emitters:

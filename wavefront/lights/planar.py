@@ -28,9 +28,9 @@ class PlanarLights(LightRecord):
     normal: Floats  # (3, k) unit normal of the front side
     area: Floats  # (k,) squared scene units
     radiance: Floats  # (3, k) W·sr⁻¹·m⁻²; the mean, where the emission varies
-    # the n surfaces that they are sampled for; None where these are not known
+    # the n surfaces for which they are sampled; None where unknown
     receiver: Receiver | None = field(default=None, kw_only=True)
-    few: bool = field(default=True, kw_only=True)  # so few that it is worth its time to know these
+    few: bool = field(default=True, kw_only=True)  # so few that sampling for surfaces is worth its time
 
     takes_receiver: ClassVar[bool] = True
     sides: ClassVar[int] = 1  # number of emitting sides

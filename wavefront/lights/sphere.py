@@ -40,7 +40,7 @@ class SphereLights(LightRecord):
     center: Floats  # (3, k) scene units
     radius: Floats  # (k,) scene units
     radiance: Floats  # (3, k) W·sr⁻¹·m⁻²
-    # the n surfaces that they are sampled for; None where these are not known
+    # the n surfaces for which they are sampled; None where unknown
     receiver: Receiver | None = field(default=None, kw_only=True)
 
     takes_receiver: ClassVar[bool] = True

@@ -28,7 +28,7 @@ class SpotLights(DeltaLight):
     position: Floats  # (3, k) scene units
     axis: Floats  # (3, k) unit direction of the emission
     outer: Floats  # (k,) 1 − cos of the angle at which the light ends
-    slope: Floats  # (k,) 1/(cos of the angle at which it begins to fall − cos of where it ends)
+    slope: Floats  # (k,) 1/(cos of the inner angle − cos of the outer one)
     intensity: Floats  # (3, k) W/sr on the axis
     # (k,) 1/(radians between both angles) where the falloff is linear in the angle, else 0
     linear: Floats

@@ -21,7 +21,7 @@ from .base import Emitters, Receiver
 from .choice import LightSampler
 
 BITS = 4  # of the number of a child: a node has 16 children; the root may have fewer
-AT_ONCE = 1 << 12  # points whose nodes are gathered together, so that they fit the cache
+AT_ONCE = 1 << 12  # points per batch: their nodes fit the cache
 FIELDS = 9  # of a child: position (3), squared extent, power, mean direction (3), spread of directions
 LEAST_SPREAD = 1e-3  # so that no light is left out for its direction
 LEAST_EXTENT = 1e-3  # of a light, in scene radii: at this distance it seems no brighter than further away

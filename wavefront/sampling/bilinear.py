@@ -144,7 +144,7 @@ def _sums(values: Doubles) -> Doubles:
 
 
 def _last(edge: Callable[[Ints], Floats], target: Floats, cells: int) -> Ints:
-    """Return the last of so many cells (n,) whose first edge is not above the targets (n,), by bisection."""
+    """Return the last of `cells` cells whose first edge is not above the targets (n,), by bisection."""
     cell = np.zeros(len(target), np.intp)
     for bit in range(cells.bit_length() - 1, -1, -1):
         tried = cell + (1 << bit)

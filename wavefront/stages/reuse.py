@@ -50,7 +50,7 @@ from .shade import Guidance, Shading
 from .transmittance import transmittance_along
 
 SHARED_WAYS = 2  # in which a path goes on from its shared point: many pixels use its light
-TILES_AT_ONCE = (1 << 15) // MEMBERS  # whose first points are connected together, so that they fit the cache
+TILES_AT_ONCE = (1 << 15) // MEMBERS  # per batch: the connections of their first points fit the cache
 GRAZING = f4(1 / 16)  # cosine to interpolated normals below which they may have been bent towards the viewer
 
 

@@ -25,7 +25,7 @@ from .student_t import log_gamma, t_tail
 BLOCKS = (8, 32)  # pixels along the sides of blocks
 ROUNDING = 1e-5  # relative difference of two means that is left to float32
 LEAST_SAMPLES = 32  # pixels or tiles that take the place of samples in a t test
-WINDOW = 5  # pixels along the sides of those around a pixel that say how noisy it is
+WINDOW = 5  # pixels along the sides of a window around a pixel, which estimates its noise
 TINY = 1e-300
 
 

@@ -30,7 +30,7 @@ CHANGED = {"branches": 1, "reuse": False, "guided": False, "caustics": False, "c
 
 @suggests_keywords
 def explain(scene: Any, image: Image, pixel: Pixel, most: int = 3) -> list[PathVertices]:
-    """Return the paths that bring most light to a pixel, the brightest first.
+    """Return the paths with the most light of a pixel, the brightest first.
 
     The samples of the pixel are traced again, by their addresses, so a firefly is found exactly.
 

@@ -25,7 +25,7 @@ Result = TypeVar("Result")
 RETRIES = 2  # times that lost processes are replaced, or that a job is given to another worker
 POLL_INTERVAL = 0.1  # seconds between two checks whether work is to stop
 CANCEL_TIMEOUT = 1.0  # seconds that jobs have to end when they are canceled
-IDLE_TIMEOUT = 10.0  # seconds after which idle workers end where no context keeps them
+IDLE_TIMEOUT = 10.0  # seconds after which idle workers end, outside of a context
 
 
 @soa
