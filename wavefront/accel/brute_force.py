@@ -154,7 +154,7 @@ class BruteForceTriangles:
             return
         tests = TriangleTests(self._table, batch, accumulator, self._partner)
         further: list[tuple[Ints, Bytes]] = []
-        for lanes, exclude_prim in self._parts(batch):
+        for lanes, exclude_prim in self._lane_slices(batch):
             value, met = self._filter(batch, lanes, exclude_prim)
             certain = np.greater(value, 1, out=scratch("certain", met.shape, np.bool_))
             certain &= met
@@ -209,7 +209,7 @@ class BruteForceTriangles:
         start_rows, end_rows = self._planes.rows(
             *(np.maximum(points[:3].max(1), -points[:3].min(1)) for points in (batch.start, batch.end))
         )
-        for lanes, exclude_prim in self._parts(batch):
+        for lanes, exclude_prim in self._lane_slices(batch):
             value = self._lines(batch, lanes, None)
             m, k = value.shape
             start = np.matmul(start_rows, batch.start[:, lanes], out=scratch("side", (m, k)))
@@ -235,7 +235,7 @@ class BruteForceTriangles:
         tests.finish()
         return None
 
-    def _parts(self, batch: RayBatch) -> Iterator[tuple[slice, Ints | None]]:
+    def _lane_slices(self, batch: RayBatch) -> Iterator[tuple[slice, Ints | None]]:
         """Yield slices of the batch, and the flat indices of their excluded polygons in (m + 1, k)."""
         n = batch.count
         excluded = self._slot.take(batch.exclude_prim) if batch.exclude_prim.max(initial=-1) >= 0 else None

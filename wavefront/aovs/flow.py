@@ -56,7 +56,7 @@ class Flow:
             hidden = next(layer for layer, of in HIDDEN.items() if of == name)
             if name not in names and hidden not in names:
                 continue
-            places, film_then, times = self._then(self.times[which], film, shape, face, point)
+            places, film_then, times = self._film_at(self.times[which], film, shape, face, point)
             if name in names:
                 yield name, self._shortest(film_then - film)
             if hidden in names:
@@ -70,7 +70,7 @@ class Flow:
         rows = np.clip(np.nan_to_num(np.floor(row)), 0, height - 1).astype(np.int64)
         return self.camera.row_delay((rows * width).astype(np.uint32))
 
-    def _then(
+    def _film_at(
         self, time: float, film: Doubles, shape: Ints, face: Ints, point: Doubles
     ) -> tuple[Doubles, Doubles, Doubles]:
         """Return where points are in the picture of a time, (n, 3) and in pixels (n, 2), and when (n,)."""

@@ -115,7 +115,7 @@ def geometric_aovs(
             continue
         hits = hits.take(met)
         rays = center.take(met), moved.take(met)
-        for name, values in _found(scene, camera, shapes, corners, names, *rays, hits):
+        for name, values in _aovs_of_hits(scene, camera, shapes, corners, names, *rays, hits):
             layers[name][span][met] = values
         if flow is not None:
             shape, face = scene.shape_numbers.of(hits), scene.shape_numbers.face(hits)
@@ -143,7 +143,7 @@ def pixel_spans(pixels: int) -> Iterator[tuple[slice, Words]]:
         yield slice(start, end), np.arange(start, end, dtype=np.uint32)
 
 
-def _found(
+def _aovs_of_hits(
     scene: CompiledScene,
     camera: Camera,
     shapes: ShapeTable,

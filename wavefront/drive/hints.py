@@ -123,7 +123,7 @@ class Hints:
         seconds = image.metadata["seconds"]
         hints = [
             *(self._ending(image) if seconds >= NOTICED else ()),
-            *(self._of(image) if seconds >= LONG else ()),
+            *(self._after_long_render(image) if seconds >= LONG else ()),
         ]
         lines = [hint for hint in hints if hint not in self._told]
         self._told.update(lines)
@@ -141,7 +141,7 @@ class Hints:
         elif self._settings.by_itself and image.spp < DEFAULT_SPP:
             yield LITTLE_NOW.format(image.spp, image.metadata["noise"])
 
-    def _of(self, image: Image) -> Iterator[str]:
+    def _after_long_render(self, image: Image) -> Iterator[str]:
         if image.metadata["hint"] is not None:
             yield image.metadata["hint"]
         if (image.metadata["rare"] or 0) > MUCH_RARE:

@@ -128,9 +128,9 @@ class BilinearDensity:
         before, _ = self._upto.edges(first + column, y, mix)
         low, high = (self._upto.node(first + k * columns - 1, mix) for k in (1, 2))
         whole = low + (high - low) * y
-        across = before + _part(x, left, right) * f4(1 / (columns - 1))
+        across = before + _integral(x, left, right) * f4(1 / (columns - 1))
         across /= np.where(whole > 0, whole, f4(1))
-        along = self._below.node(row, mix) + _part(y, low, high) * f4(1 / (rows - 1))
+        along = self._below.node(row, mix) + _integral(y, low, high) * f4(1 / (rows - 1))
         return np.stack([across, along]), left + (right - left) * x
 
 
@@ -154,11 +154,11 @@ def _last(edge: Callable[[Ints], Floats], target: Floats, cells: int) -> Ints:
 
 
 def _position(integral: Floats, low: Floats, high: Floats) -> Floats:
-    """Return x in [0, 1] up to which a density that runs from `low` to `high` has the integral `integral`."""
+    """Return x in [0, 1] up to which a density that runs from `low` to `high` has this integral."""
     root = low + np.sqrt(np.maximum(low * low + f4(2) * integral * (high - low), f4(0)))
     return np.clip(f4(2) * integral / np.where(root > 0, root, f4(1)), f4(0), f4(1))
 
 
-def _part(x: Floats, low: Floats, high: Floats) -> Floats:
+def _integral(x: Floats, low: Floats, high: Floats) -> Floats:
     """Return the integral up to x of a density that runs from `low` to `high`."""
     return x * (low + f4(0.5) * x * (high - low))
