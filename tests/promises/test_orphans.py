@@ -31,6 +31,8 @@ STARTS = {
 class Ended:
     """In place of a parent that has ended."""
 
+    sentinel = 0
+
     def is_alive(self) -> bool:
         return False
 
@@ -56,3 +58,11 @@ def test_processes_end_after_the_one_that_started_them(start: str, number: signa
     process.wait(SOON)
     assert eventually(lambda: not any(map(runs, found)))
     process.communicate()
+
+
+def test_a_parent_of_which_nothing_is_known_interrupts_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
+    """As those of loky's processes, which multiprocessing has not started."""
+    monkeypatch.setattr(
+        multiprocessing, "parent_process", lambda: multiprocessing.process._ParentProcess("parent", 1, None)
+    )
+    interrupt.end_with_parent()

@@ -35,7 +35,9 @@ def end_with_parent() -> None:
         If the parent has ended.
     """
     parent = multiprocessing.parent_process()
-    if parent is not None and not parent.is_alive():
+    if parent is None or parent.sentinel is None:  # a process of loky has a parent, without a sentinel
+        return
+    if not parent.is_alive():
         timer = threading.Timer(ORPHAN_TIMEOUT, os._exit, (1,))
         timer.daemon = True
         timer.start()
