@@ -184,7 +184,7 @@ from wavefront.features.receivers import Receivers
 from wavefront.features.shadow_catchers import ShadowCatchers
 from wavefront.features.shadow_terminator import ShadowTerminator, heights_of
 from wavefront.features.unseen import Unseen
-from wavefront.features.view import seen_by
+from wavefront.features.view import seen_by, seen_with
 from wavefront.film import aov_sums, checkpoint
 from wavefront.film.aov_names import AOVS, BRIGHTEST, NARROW
 from wavefront.film.checkpoint import HEADER, read_header
@@ -336,7 +336,7 @@ from wavefront.scene.lighting import LIGHTINGS, PRESETS, lighted
 from wavefront.scene.scene import VIEWS, Scene
 from wavefront.scene.state import scene_state
 from wavefront.settings import SETTINGS
-from wavefront.settings.checks import EXCLUSIONS, MEDIA, MOVING, ROLLING, SETTING_OF, Exclusion, table
+from wavefront.settings.checks import EXCLUSIONS, MEDIA, MOVING_IN_TURN, ROLLING, SETTING_OF, Exclusion, table
 from wavefront.settings.settings import DEFAULT_SPP, LITTLE_NOISE, Settings
 from wavefront.shapes.instance import Instance, can_place, instance_bounds
 from wavefront.shapes.mesh import Mesh

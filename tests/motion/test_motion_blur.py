@@ -4,12 +4,13 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
-from inside import Shutter, compile_scene, generate, make_accelerator, make_sampler, seen_by
+from inside import Shutter, compile_scene, generate, make_accelerator, make_sampler, seen_by, seen_with
 from scipy import integrate, stats
 from significance import ALPHA, render, smallest_p
 
 import wavefront as wf
 
+ASKED = {"shutter": Shutter(0, 1)}  # of a compiled scene
 OPTIONS = {"ground": False, "lighting": None, "branches": 1, "reuse": False}
 
 
@@ -263,12 +264,67 @@ def test_malformed_shutter_is_refused(shutter):
         render(SCENES["instance"], 1, shutter=shutter)
 
 
-def test_shared_paths_are_refused_where_something_moves():
-    options = {**OPTIONS, "reuse": True, "shutter": (0, 1)}
+def test_shared_paths_are_refused_where_a_sensor_is_read_in_turn():
+    """Pixels of different rows see the scene at different times."""
+    options = {**OPTIONS, "reuse": True, "shutter": (0, 0.5)}
     for name in ("instance", "point"):
-        with pytest.raises(wf.SceneError, match="move while the shutter is open"):
-            render(SCENES[name], 1, **options)
-    render(SCENES["camera"], 1, **options)
+        scene = SCENES[name]
+        with pytest.raises(wf.SceneError, match="must see the scene at one time"):
+            render(scene, 1, camera=scene.camera.replace(rolling_shutter=0.5), **options)
+    render(SCENES["camera"], 1, camera=SCENES["camera"].camera.replace(rolling_shutter=0.5), **options)
+
+
+def under_a_ceiling(*shapes, lamps):
+    """A floor seen from above, which gets the light of a ceiling that lamps shine at."""
+    above = wf.Rectangle((-3, 2, -3), (6, 0, 0), (0, 0, 6), material=wf.Diffuse(0.8))
+    camera = wf.Camera.orthographic((0, 0.5, 0), (0, 0, 0), up=(0, 0, -1), height=4, size=28)
+    return wf.Scene([floor(), above, *shapes], [*lamps], camera)
+
+
+def at_two_places(first, then, moment, thing):
+    """A thing that is away by `first`, and from a moment on by `then`."""
+    times = [0, moment - 1e-3, moment + 1e-3, 1]
+    return thing.transformed(wf.Keyframes(times, [placed(each) for each in (first, first, then, then)]))
+
+
+UPWARDS = wf.SpotLight((1.5, 0.9, 0), 10, direction=(-0.3, 1, 0), angle=60)
+
+
+def test_shared_paths_do_not_mix_times():
+    """The lamp is on from 0.5 s on, when a black plate covers the left half: nothing lights that ever."""
+    plate = wf.Rectangle((-3, 0, 3), (3, 0, 0), (0, 0, -6), material=wf.Diffuse(0), two_sided=True)
+    plate = at_two_places((0, -50, 0), (0, -0.5, 0), 0.5, plate)
+    scene = under_a_ceiling(plate, lamps=[at_two_places((0, -50, 0), (0, 0, 0), 0.5, UPWARDS)])
+    rgb = render(scene, 16, shutter=(0, 1), **{**OPTIONS, "reuse": True}).rgb
+    assert (rgb[:, :14] == 0).all()
+    assert rgb[:, 14:].mean() > 0.01
+
+
+def test_shared_paths_see_what_is_between_them_at_their_times():
+    """A plate hides the ceiling from the left of the floor at all times, but not in the very middle.
+
+    With this seed no path comes then.
+    """
+    plate = wf.Rectangle((-3, -0.2, 3), (3, 0, 0), (0, 0, -6), material=wf.Diffuse(0), two_sided=True)
+    away = [placed((0, 50 * (k in (2, 3)), 0)) for k in range(6)]
+    plate = plate.transformed(wf.Keyframes([0, 0.49998, 0.49999, 0.50001, 0.50002, 1], away))
+    scene = under_a_ceiling(plate, lamps=[UPWARDS])
+    camera = wf.Camera.orthographic((0, -0.3, 0), (0, -0.6, 0), up=(0, 0, -1), height=4, size=28)
+    rgb = render(scene, 16, camera=camera, seed=2, shutter=(0, 1), **{**OPTIONS, "reuse": True}).rgb
+    assert (rgb[:, :9] == 0).all()
+    assert rgb[:, 14:].mean() > 0.01
+
+
+def test_paths_that_are_shared_have_one_time():
+    camera, sampler = view(28), make_sampler("sobol", 3, 28)
+    tiles, pixel = camera.tiles, np.arange(28 * 28, dtype=np.uint32)
+    scene = SCENES["instance"]
+    scene = compile_scene(scene, lambda geometry: make_accelerator(geometry, "numpy"), asked=ASKED)
+    seen = seen_with(seen_by(scene, camera, Shutter(0, 1)), tiles=tiles)
+    time = generate(seen, camera, sampler, pixel, np.zeros(pixel.size, np.uint32)).time
+    tile, _ = tiles.place(pixel)
+    assert np.unique(time).size == 49 == np.unique(tile).size
+    assert np.unique(np.stack([tile, time]), axis=1).shape[1] == 49
 
 
 def test_trace_shows_the_time_of_each_path():
@@ -328,6 +384,7 @@ def mixed_scene():
     glass, gold = wf.Dielectric(1.5), wf.Conductor("gold", roughness=0.3)
     amber, fog = filled(glass, absorption=(0.2, 1, 3)), filled(wf.NullSurface(), scattering=2)
     lamp = wf.Rectangle((-0.6, 2, -0.6), (1.2, 0, 0), (0, 0, 1.2), emission=6)
+    walls = wf.Box((0, 1.4, 0), 4, material=wf.Diffuse(0.7))
     leaf = wf.Material(wf.Diffuse(0.5), alpha=0.5)
     catcher = wf.Rectangle((-3, -0.6, 3), (6, 0, 0), (0, 0, -6), material=wf.ShadowCatcher())
 
@@ -339,7 +396,6 @@ def mixed_scene():
         shape.material = material
         return shape
 
-    walls = wf.Box((0, 1.4, 0), 4, material=wf.Diffuse(0.7))
     return {
         "glass": of(carried(box, glass)),
         "gold": of(carried(ball, gold)),
@@ -359,6 +415,8 @@ def mixed_scene():
             {},
         ),
         "lamp in a room": (wf.Scene([walls, lamp.transformed(SLIDE)], [], view(origin=(0, 1, 1.8))), {}),
+        "shared": of(carried(box, gold), walls, reuse=True),
+        "shared in glass": of(carried(box, gold), carried(ball, amber).translated((1, 0.5, 0)), reuse=True),
         "direct": of(carried(box, gold), integrator="direct_mis"),
         "naive": of(carried(box, gold), integrator="naive"),
     }

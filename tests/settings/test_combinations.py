@@ -9,7 +9,18 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from inside import EXCLUSIONS, MEDIA, MOVING, ROLLING, SETTING_OF, SETTINGS, Exclusion, choice, table, tiles
+from inside import (
+    EXCLUSIONS,
+    MEDIA,
+    MOVING_IN_TURN,
+    ROLLING,
+    SETTING_OF,
+    SETTINGS,
+    Exclusion,
+    choice,
+    table,
+    tiles,
+)
 from scenes import cornell_box
 
 import wavefront as wf
@@ -66,7 +77,7 @@ VALUES: dict[str, Any] = {  # of each setting, one that is not its default
 }
 USUAL = {"size": (8, 8), "max_bounces": 4, "lighting": "cloudy", "workers": 1, "progress": False}
 OF_SETTINGS = [
-    each for each in EXCLUSIONS if each.other not in (MEDIA, MOVING, ROLLING)
+    each for each in EXCLUSIONS if each.other not in (MEDIA, MOVING_IN_TURN, ROLLING)
 ]  # tests/media has those of scenes
 NAMED = {name for each in EXCLUSIONS for name in (each.one, each.other)}
 QUICK = [name for name in VALUES if name in NAMED and name not in ("guide", "material")]

@@ -9,7 +9,7 @@ without features pays for none, and no stage asks for absent ones.
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import field, replace
 from typing import TYPE_CHECKING, Any, ClassVar, Self, TypeVar
 
@@ -144,8 +144,13 @@ class Feature:
     def begin(self, scene: CompiledScene, paths: Paths) -> None:
         """Give paths that start at the camera the columns that they need."""
 
-    def expose(self, scene: CompiledScene, camera: Camera, rays: Rays, pixel: Words, u: Floats) -> None:
-        """Give rays of a camera, through pixels (n,) of the whole picture, times by u (n,) in [0, 1)."""
+    def expose(
+        self, scene: CompiledScene, camera: Camera, rays: Rays, pixel: Words, draw: Callable[[Words], Floats]
+    ) -> None:
+        """Give rays of a camera, through pixels (n,) of the whole picture, times.
+
+        `draw` returns numbers in [0, 1) for addresses (n,), such as the pixels.
+        """
 
     def fly(self, leg: Leg) -> None:
         """Change paths and their hits, before any light is added."""

@@ -115,7 +115,7 @@ def _ways(choice: Choice) -> int:
 def _chosen(settings: Settings, scene: CompiledScene, camera: Camera, asked: Choice, found: Run) -> Choice:
     """Return whether pixels share paths, or else how many branches these have, by what a run has found."""
     asked = replace(asked, hint=GUIDE_HINT if _light_is_rare(found) and not asked.guided else None)
-    if _may_reuse(settings, camera) and _sharing_pays(scene, found):
+    if _may_reuse(settings, scene, camera) and _sharing_pays(scene, found):
         return replace(asked, reuse=True)
     return _branched(settings, camera, found, asked)
 
@@ -164,7 +164,8 @@ def _tries_something(settings: Settings, scene: CompiledScene, camera: Camera) -
     return rough and bool(scene.lights.kinds)
 
 
-def _may_reuse(settings: Settings, camera: Camera) -> bool:
-    """Return whether settings and size of a picture allow that its pixels share paths by themselves."""
-    free = settings.values["reuse"] == AUTO and not left_out(settings.values, "reuse")
+def _may_reuse(settings: Settings, scene: CompiledScene, camera: Camera) -> bool:
+    """Return whether settings, scene and camera allow that pixels share paths by themselves."""
+    in_turn = scene.motion is not None and camera.rolling_shutter != 0
+    free = settings.values["reuse"] == AUTO and not left_out(settings.values, "reuse") and not in_turn
     return free and (camera.sensor is not None or min(camera.size) >= SIDE * STRIDE)

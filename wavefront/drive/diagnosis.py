@@ -267,7 +267,7 @@ def first_nan(user_scene: Scene, tracer: Tracer, view: CameraJob, pixels: Words,
     camera = view.camera
     sampler = tracer.sampler(camera.resolution[0])
     samples = np.full(pixels.size, sample, np.uint32)
-    scene = seen_with(tracer.scene, tracer.table if view.guided else None, view.branches)
+    scene = seen_with(tracer.scene, tracer.table if view.guided else None, view.branches, view.tiles)
     paths = generate(scene, camera, sampler, pixels, samples, tracer.filter)
     recorder = paths.recorder = NanRecorder(user_scene, tracer.layers)
     integrator = integrator_for(tracer.integrator, view.tiles)

@@ -28,7 +28,7 @@ from ..motion.shutter import Shutter
 from ..scene import Scene
 from ..scene.lighting import DEFAULT, choose_ground, choose_preset, is_above, lighted
 from ..settings import AUTO, Settings
-from ..settings.checks import MEDIA, MOVING, ROLLING, check_combinations
+from ..settings.checks import MEDIA, MOVING_IN_TURN, ROLLING, check_combinations
 
 
 class PreparedScene:
@@ -78,9 +78,8 @@ class PreparedScene:
             compiled = self._compile(settings)
         scatters = compiled.media is not None and not compiled.media.only_absorbs
         rolls = self._span is not None and camera.rolling_shutter != 0
-        check_combinations(
-            {**settings.values, MEDIA: scatters, MOVING: compiled.motion is not None, ROLLING: rolls}
-        )
+        in_turn = rolls and compiled.motion is not None
+        check_combinations({**settings.values, MEDIA: scatters, MOVING_IN_TURN: in_turn, ROLLING: rolls})
         self.compiled = replace(compiled, roulette_after=settings.roulette_after)
         self.shapes = ShapeTable(self.lighted.shapes)
 

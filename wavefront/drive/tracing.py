@@ -135,8 +135,8 @@ def _trace_wave(tracer: Tracer, monitor: WaveMonitor, job: Job) -> WaveResult:
         deadline = max(deadline, begin + FIRST_SAMPLE_TIMEOUT)
     accelerator = MonitoredAccelerator(tracer.scene.accelerator, monitor, deadline)
     whole = replace(tracer.scene, accelerator=accelerator)  # as paths from lights meet it
-    scene = seen_with(whole, tracer.table if job.view.guided else None, job.view.branches)
     pixels, samples, tiles = np.tile(job.pixels, n), _samples(job), job.view.tiles
+    scene = seen_with(whole, tracer.table if job.view.guided else None, job.view.branches, tiles)
     recorder = SampleRecorder(tracer.layers, scene, k * n, tracer.clamp) if tracer.layers else None
     sampler = tracer.sampler(camera.resolution[0])
     radiance = tracer.radiance(scene, camera, sampler, pixels, samples, recorder or NOBODY, tiles)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Self
 
 import numpy as np
@@ -15,6 +16,7 @@ from ..compile.program import Facts, Feature
 from ..compile.scene import CompiledScene
 from ..motion.shutter import Shutter
 from ..motion.steps import Motions, applied, inverse_linear, moved_back, transposed_turned
+from ..sampling.tiles import Tiles
 from ..stages.interaction import Surfaces
 from ..stages.intersect import ShadowRays
 from ..stages.shade import LightRays, Shading
@@ -197,10 +199,14 @@ class Exposure(Feature):
     compared = False  # it follows from settings and the camera
     shutter: Shutter
     motions: Motions | None = None  # one, from the scene to where it is for a camera that stands still
+    tiles: Tiles | None = None  # whose paths have one time, as they are shared; None where none are
 
-    def expose(self, scene: CompiledScene, camera: Camera, rays: Rays, pixel: Words, u: Floats) -> None:
+    def expose(
+        self, scene: CompiledScene, camera: Camera, rays: Rays, pixel: Words, draw: Callable[[Words], Floats]
+    ) -> None:
         """Give rays their times, and begin them where a camera that moves is then."""
-        rays.time = self.times(camera, pixel, u)
+        address = pixel if self.tiles is None else self.tiles.place(pixel)[0].astype(pixel.dtype)
+        rays.time = self.times(camera, pixel, draw(address))
         rays.origin, rays.direction = self.seen_from(rays.time, rays.origin, rays.direction)
 
     def times(self, camera: Camera, pixel: Words, u: Floats) -> Doubles:

@@ -205,7 +205,7 @@ ONE_PATH = "light of shared paths comes from many paths at once"
 ANY_PIXEL = "paths from lights reach any pixel"
 ONLY_FULL = "only the paths of integrator='full' go on from surface to surface with light samples"
 MEDIA = "media that scatter"  # or emit, or vary: known of a scene once it is compiled
-MOVING = "shapes or lights that move while the shutter is open"  # likewise
+MOVING_IN_TURN = "a rolling shutter where shapes or lights move"  # likewise
 ROLLING = "a camera with a rolling shutter"  # likewise
 GIVEN = "samples are given by their numbers"
 EXCLUSIONS = (
@@ -222,7 +222,7 @@ EXCLUSIONS = (
     Exclusion("branches", "another integrator", ONLY_FULL),
     Exclusion("reuse", MEDIA, "points within media are not shared"),
     Exclusion("caustics", MEDIA, "paths from lights do not follow them"),
-    Exclusion("reuse", MOVING, "each path meets the scene at a time of its own"),
+    Exclusion("reuse", MOVING_IN_TURN, "pixels that share paths must see the scene at one time"),
     Exclusion("caustics", ROLLING, "a path from a light has a time before it is known which row it reaches"),
     Exclusion("view", "camera", "a view is framed by a camera of its own"),
     Exclusion("fov", "camera", "a camera has a field of view of its own"),
@@ -240,7 +240,7 @@ ASKED: dict[str, Callable[[Mapping[str, Any]], bool]] = {
     "branches": lambda values: values["branches"] not in (1, AUTO),
     "features": lambda values: bool(values["features"]),
     MEDIA: lambda values: bool(values.get(MEDIA)),
-    MOVING: lambda values: bool(values.get(MOVING)),
+    MOVING_IN_TURN: lambda values: bool(values.get(MOVING_IN_TURN)),
     ROLLING: lambda values: bool(values.get(ROLLING)),
     "filter": lambda values: FILTERS.find(values["filter"]) is not box,
     "light groups": lambda values: "light_groups" in values["aovs"],
@@ -292,7 +292,7 @@ def _both_ways() -> Iterator[Exclusion]:
 
 
 def _in_words(values: Mapping[str, Any], name: str) -> str:
-    if name in (MEDIA, MOVING, ROLLING):
+    if name in (MEDIA, MOVING_IN_TURN, ROLLING):
         return name
     setting = SETTING_OF.get(name, name)
     return f"{setting}={in_brief(SHOWN.get(setting, lambda value: value)(values[setting]))}"

@@ -51,7 +51,7 @@ def generate(
         sensor=sensor,
     )
     for expose in scene.program.expose:
-        expose(scene, camera, paths, pixel, sampler.draw_1d(pixel, sample, 0, Dimension.TIME))
+        expose(scene, camera, paths, pixel, lambda at: sampler.draw_1d(at, sample, 0, Dimension.TIME))
     for begin in scene.program.begin:
         begin(scene, paths)
     return paths
@@ -62,7 +62,7 @@ def center_rays(scene: CompiledScene, camera: Camera, pixel: Words) -> Rays:
     origin, direction, _ = _seen(scene, camera, camera.address(pixel), HALF, None)
     rays = Rays(origin, direction, np.full(len(pixel), -1, np.intp))
     for expose in scene.program.expose:
-        expose(scene, camera, rays, camera.address(pixel), broadcast(f4(0.5), len(pixel)))
+        expose(scene, camera, rays, camera.address(pixel), lambda at: broadcast(f4(0.5), len(at)))
     return rays
 
 

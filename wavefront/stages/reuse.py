@@ -30,6 +30,7 @@ from ..arrays.vec import (
     INV_PI,
     TINY,
     Bools,
+    Doubles,
     Floats,
     Ints,
     dot,
@@ -300,6 +301,7 @@ class FirstPoints:
     # (4, ·) stacks of the paths that come, and their changes at the surfaces, (k, ·)
     media: Any = None  # None in scenes without a table of media
     crossing: Any = None  # likewise
+    time: Doubles | None = None  # (·,) of the paths; None where nothing moves while the shutter is open
 
     @classmethod
     def of(cls, lit: Shading, albedo: Floats | None, lane_in: Ints, media: Any = None) -> Self | None:
@@ -322,11 +324,12 @@ class FirstPoints:
         inside = None, None
         if media is not None:
             inside = take(media, lanes), take(lit.crossing, lanes)
+        time = None if lit.surface.time is None else take(lit.surface.time, lanes)
         if albedo is None:
             at = lit.at(lanes)
             start, error = at.start.reshape(3, *shape), at.surface.error.reshape(shape)
             prim, ns = at.surface.prim, at.surface.ns
-            return cls(present, start, error, prim, ns, at, None, None, at.guidance, *inside)
+            return cls(present, start, error, prim, ns, at, None, None, at.guidance, *inside, time)
         surface, albedo = lit.surface, take(albedo, lanes).reshape(3, *shape)
         return cls(
             present & (highest(albedo) != 0),
@@ -339,6 +342,7 @@ class FirstPoints:
             None if surface.ns is surface.ng else take(surface.ng, lanes),
             lit.guidance_at(lanes),
             *inside,
+            time,
         )
 
     def evaluate(self, wi: Floats) -> tuple[Floats, Floats]:
@@ -441,6 +445,7 @@ def connect(
         distance=f4(1) / take(inverse.reshape(-1), lanes),
         cos_light=take(cos_target.reshape(-1), lanes),
         media=first.stacks(toward, lanes),
+        time=None if first.time is None else take(first.time, lanes),
     )
     return Connections(f.reshape(-1, *shape), pdf.reshape(shape), geometry, lanes, rays)
 
@@ -489,10 +494,8 @@ def can_reuse(scene: CompiledScene) -> bool:
     """Return whether any path of a scene can be shared.
 
     Where surfaces with alpha and media are mixed none is: transmittance differs between channels then.
-    Nor is any where media scatter, or where something moves: each path meets the scene at a time of its own.
+    Nor is any where media scatter.
     """
-    if scene.motion is not None:
-        return False
     if scene.media is not None and not scene.media.only_absorbs:
         return False
     absorbs = scene.program.weaken or scene.program.dim
