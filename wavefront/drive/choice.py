@@ -1,4 +1,4 @@
-"""How the paths of a picture go on: what was asked for, and what "auto" comes to.
+"""How the paths of a picture go on: by the settings, and by a choice where these are "auto".
 
 A choice depends on the scene, the camera, the size of the whole picture and on settings that a checkpoint
 must have in common with the render that goes on from it. It does not depend on the number of samples, so
@@ -45,7 +45,7 @@ class Choice:
     branches: int = 1
     reuse: bool = False
     guided: bool = False
-    hint: str | None = None  # what may pay besides
+    hint: str | None = None  # another setting that may pay
 
 
 def learn_guide(settings: Settings, scene: CompiledScene, camera: Camera) -> GuideTable | None:
@@ -67,7 +67,7 @@ def choose(
     maker: SamplerMaker,
     table: GuideTable | None,
 ) -> Choice:
-    """Return how the paths of a picture go on, and what else may pay, by a tuning run where one is needed.
+    """Return the choice of how paths go on, and a hint, by a tuning run where one is needed.
 
     Parameters
     ----------
@@ -76,7 +76,7 @@ def choose(
     maker
         Of samplers, given a seed and the width of a picture.
     table
-        What may guide the paths.
+        The table that may guide the paths.
     """
     branches, reuse = settings.values["branches"], settings.values["reuse"] is True
     asked = Choice(1 if branches == AUTO else int(branches), reuse, table is not None)
@@ -112,35 +112,35 @@ def _ways(choice: Choice) -> int:
     return 1 if choice.reuse else choice.branches
 
 
-def _chosen(settings: Settings, scene: CompiledScene, camera: Camera, asked: Choice, found: Run) -> Choice:
-    """Return whether pixels share paths, or else how many branches these have, by what a run has found."""
-    asked = replace(asked, hint=GUIDE_HINT if _light_is_rare(found) and not asked.guided else None)
-    if _may_reuse(settings, scene, camera) and _sharing_pays(scene, found):
+def _chosen(settings: Settings, scene: CompiledScene, camera: Camera, asked: Choice, run: Run) -> Choice:
+    """Return whether pixels share paths, or else how many branches these have, by the results of a run."""
+    asked = replace(asked, hint=GUIDE_HINT if _light_is_rare(run) and not asked.guided else None)
+    if _may_reuse(settings, scene, camera) and _sharing_pays(scene, run):
         return replace(asked, reuse=True)
-    return _branched(settings, camera, found, asked)
+    return _branched(settings, camera, run, asked)
 
 
-def _light_is_rare(found: Run) -> bool:
-    return found.mean_variance() > RARE_LIGHT
+def _light_is_rare(run: Run) -> bool:
+    return run.mean_variance() > RARE_LIGHT
 
 
-def _sharing_pays(scene: CompiledScene, found: Run) -> bool:
+def _sharing_pays(scene: CompiledScene, run: Run) -> bool:
     """Return whether sharing paths pays: most of them can be shared, and these make the noise.
 
     Narrow lobes at second points may make bright spots, which no pixel can share. So do mirrors and glass,
     also those that the run has not met, unless all light is hard to find.
     """
     alone = ~(shared_materials(scene) | glossy_materials(scene))
-    if not can_reuse(scene) or found.met[~alone].sum() < MOST_PATHS * found.paths:
+    if not can_reuse(scene) or run.met[~alone].sum() < MOST_PATHS * run.paths:
         return False
-    if found.share_of_own() > OWN_LIGHT:
+    if run.share_of_own() > OWN_LIGHT:
         return False
-    wide = found.narrow <= NARROW_LOBES * found.paths
-    even = wide or found.share_of_outliers() < BRIGHT_SPOTS_OF_SHARED
-    return even and (_light_is_rare(found) or not alone.any())
+    wide = run.narrow <= NARROW_LOBES * run.paths
+    even = wide or run.share_of_outliers() < BRIGHT_SPOTS_OF_SHARED
+    return even and (_light_is_rare(run) or not alone.any())
 
 
-def _branched(settings: Settings, camera: Camera, found: Run, choice: Choice) -> Choice:
+def _branched(settings: Settings, camera: Camera, run: Run, choice: Choice) -> Choice:
     """Return a choice with branches if they pay.
 
     Paths from sensors have no first ray to share. Where light is rare, and not shared, few bright paths make
@@ -148,8 +148,8 @@ def _branched(settings: Settings, camera: Camera, found: Run, choice: Choice) ->
     """
     if settings.values["branches"] != AUTO or choice.reuse or camera.sensor is not None:
         return choice
-    even = not _light_is_rare(found) and found.share_of_outliers() < BRIGHT_SPOTS
-    pays = even and found.cost(BRANCHES, found) < GAIN_OF_BRANCHES
+    even = not _light_is_rare(run) and run.share_of_outliers() < BRIGHT_SPOTS
+    pays = even and run.cost(BRANCHES, run) < GAIN_OF_BRANCHES
     return replace(choice, branches=BRANCHES) if pays else choice
 
 

@@ -32,7 +32,7 @@ def seen_with(
 ) -> CompiledScene:
     """Return a scene for the paths of a view, with the table that guides them, and their branches.
 
-    Paths of the same tile share what they find, so that all of them have one time. Paths from lights meet the
+    Paths of a tile share light, so that all of them have one time. Paths from lights meet the
     scene as it is.
     """
     guides = () if table is None else (Guide(table),)
