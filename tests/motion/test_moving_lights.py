@@ -76,3 +76,67 @@ def test_moving_light_at_a_time_is_the_still_one(name):
                 rows[-1] += [sample.wi, sample.distance, sample.pdf / chance]
         for one, other in zip(*rows, strict=True):
             np.testing.assert_allclose(one, other, rtol=3e-3, atol=3e-4)
+
+
+SPIN = wf.Keyframes([0, 1], [placed((0, 0, 0), 10), placed((1, 2, 3), 130)])  # its ways have no effect
+PIXELS = np.random.default_rng(3).random((8, 16, 3)) ** 4
+DOMES = {
+    "image": lambda turn: wf.Environment(PIXELS, transform=turn),
+    "backdrop": lambda turn: wf.Environment(PIXELS, transform=turn, backdrop=PIXELS[::-1]),
+    "color": lambda turn: wf.Environment((1, 2, 3), transform=turn),
+}
+
+
+@pytest.mark.parametrize("name", DOMES)
+def test_an_environment_turns_as_its_transform_does(name):
+    make = DOMES[name]
+    moving = make(SPIN)
+    assert moving.moves
+    assert moving.time_span == (0, 1)
+    for time in (0, 0.4, 1):
+        still, want = moving.at(time), make(SPIN.at(time)[:3, :3])
+        assert not still.moves
+        pictures = [wf.render([wf.Sphere((0, 0, 0), 1), sky], 2, size=(12, 8)) for sky in (still, want)]
+        np.testing.assert_array_equal(pictures[0].rgb, pictures[1].rgb)
+    carried = make(None).transformed(SPIN).at(0.4)
+    np.testing.assert_array_equal(carried.radiance, moving.radiance)
+    np.testing.assert_allclose(carried._transform, SPIN.at(0.4)[:3, :3], atol=1e-12)
+
+
+def test_an_environment_at_a_time_draws_directions_by_its_density():
+    wf.testing.check_light(wf.Environment(PIXELS, transform=SPIN).at(0.4))
+
+
+def test_radiance_that_is_assigned_to_a_turning_environment_turns():
+    moving, want = DOMES["image"](SPIN), wf.Environment(PIXELS[::-1], transform=SPIN.at(0.4)[:3, :3])
+    moving.radiance = PIXELS[::-1]
+    wi = np.eye(3, dtype=np.float32)
+    found = moving.at(0.4).record(np.zeros(3)).le(wi)
+    np.testing.assert_array_equal(found, want.record(np.zeros(3)).le(wi))
+
+
+def test_a_sky_turns_with_its_sun():
+    sky = wf.Sky.cie(12, (1, 1, 0.5), horizontal=100, direct_normal=700)
+    turn, ways = SPIN.at(0.4)[:3, :3], np.random.default_rng(5).normal(size=(9, 3))
+    still = sky.transformed(SPIN).at(0.4)
+    np.testing.assert_allclose(still.sun, turn @ sky.sun, atol=1e-12)
+    np.testing.assert_allclose(still.radiance(ways @ turn.T), sky.radiance(ways), rtol=1e-4)
+    with pytest.raises(wf.SceneError, match="Sky transform must be a rotation"):
+        sky.transformed(np.diag([1, 2, 1, 1]))
+
+
+def test_an_environment_that_would_be_stretched_is_refused():
+    stretched = wf.Keyframes([0, 1], [np.eye(4), np.diag([2, 1, 1, 1])])
+    with pytest.raises(wf.SceneError, match="Environment transform must be a rotation"):
+        wf.Environment(PIXELS, transform=stretched).at(0.5)
+
+
+def test_an_environment_that_turns_while_the_shutter_is_open_is_as_in_the_middle():
+    scene = wf.Scene([wf.Sphere((0, 0, 0), 1)], DOMES["image"](SPIN))
+    with pytest.warns(UserWarning, match="Environment turns while the shutter is open.*as in the middle"):
+        blurred = wf.render(scene, 2, size=(12, 8), shutter=(0.2, 0.6), denoise=False)
+    still = wf.render(scene.at(0.4), 64, size=(12, 8), denoise=False)
+    np.testing.assert_allclose(blurred.rgb.mean(), still.rgb.mean(), rtol=0.1)
+    closed = wf.render(scene.at(0.2), 64, size=(12, 8), denoise=False)
+    sky = blurred.rgb[0], still.rgb[0], closed.rgb[0]  # the uppermost row, which nothing hides
+    assert np.abs(sky[0] - sky[1]).mean() < np.abs(sky[2] - sky[1]).mean() / 2

@@ -287,8 +287,6 @@ def test_lights_move(tmp_path):
     for light in lights[2:5]:
         with pytest.raises(wf.SceneError, match="transform mirrors"):
             light.transformed(mirror)
-    with pytest.raises(wf.SceneError, match="Environment cannot be moved"):
-        wf.Environment(1).transformed(motion)
 
 
 def test_a_scene_of_a_moment_shares_what_stands_still():

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 from contextlib import nullcontext
+from copy import copy
 from dataclasses import replace
 from typing import Literal, Self
 
@@ -19,6 +20,7 @@ from ..core.errors import as_array, called, one_of, rotation_matrix
 from ..core.parameter import Parameter, Parametrized
 from ..core.suggestions import suggests_keywords
 from ..film.aov_names import DEFAULT_GROUP, group_name
+from ..motion import Motion
 from ..sampling.warp import uniform_sphere
 from .base import FarLight, LightSample
 from .image import ImageEnvironment, environment_pixels
@@ -66,7 +68,8 @@ class Environment(Parametrized, FarLight):
         Pictures of 8 and 16 bits are decoded from sRGB and count from 0 to 1; all others are linear. Alpha is
         not used.
     transform
-        (3, 3) rotation from the environment's space to world space.
+        (3, 3) rotation from the environment's space to world space; or a motion, such as `Keyframes`, whose
+        matrices turn it. Their translations have no effect.
     scale
         A color, at least 0, that multiplies this radiance.
     filter
@@ -118,13 +121,14 @@ class Environment(Parametrized, FarLight):
         self,
         radiance: ArrayLike | str | os.PathLike[str] = 1.0,
         *,
-        transform: ArrayLike | None = None,
+        transform: ArrayLike | Motion | None = None,
         scale: ArrayLike | str = 1.0,
         filter: Literal["bilinear", "nearest"] = "bilinear",
         rows: Literal["centers", "poles"] = "centers",
         group: str = DEFAULT_GROUP,
         backdrop: ArrayLike | str | os.PathLike[str] | None = None,
     ) -> None:
+        motion, transform = (transform, None) if isinstance(transform, Motion) else (None, transform)
         self.backdrop: Environment | None = None
         if backdrop is not None:
             with called("Environment backdrop", "Environment radiance"):
@@ -138,6 +142,8 @@ class Environment(Parametrized, FarLight):
         self.radiance = radiance
         self._scale = np.ones((3, 1), f4)  # a radiance that is assigned later is not scaled
         self.group = group
+        if motion is not None:
+            vars(self).update(vars(copy(self).transformed(motion)))
 
     @property
     def radiance(self) -> Floats:
@@ -169,3 +175,23 @@ class Environment(Parametrized, FarLight):
     def record(self, center: Doubles) -> InfiniteLight:
         """Return the light as a record of one column."""
         return ConstantEnvironment(self.radiance) if self._image is None else self._image
+
+    def _transformed(self, matrix: Doubles) -> Self:
+        """Return a copy that is turned by an affine matrix (4, 4)."""
+        turn = rotation_matrix("Environment transform", matrix[:3, :3])
+        return self._turned_to(turn if self._transform is None else turn @ self._transform)
+
+    def _placed_as(self, other: Self) -> Self:
+        """Return a copy that is turned as another environment."""
+        return self._turned_to(other._transform)
+
+    def _turned_to(self, rotation: Doubles | None) -> Self:
+        """Return a copy with a rotation (3, 3) to world space; images and tables by texel are shared."""
+        light = copy(self)
+        light._transform = rotation
+        if self._image is not None:
+            to_world = None if rotation is None else rotation.astype(f4)
+            light._image = replace(self._image, rotation=to_world, made=None)
+        if self.backdrop is not None:
+            light.backdrop = self.backdrop._turned_to(rotation)
+        return light

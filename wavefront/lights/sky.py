@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from copy import copy
 from dataclasses import replace
 from functools import partial
 from typing import Any, ClassVar, Self
@@ -17,7 +18,7 @@ from ..arrays.vec import Doubles, Floats, column, dot, f4
 from ..camera import upward
 from ..colors import DAYLIGHT, EFFICACY, Photometric, from_photometric, rgb
 from ..colors.photometry import photometric
-from ..core.errors import SceneError, finite_array, flag, number
+from ..core.errors import SceneError, finite_array, flag, number, rotation_matrix
 from ..core.parameter import Parameter, Parametrized, brief, instance_of, optional, parametrized
 from ..core.suggestions import suggests_keywords
 from ..film.aov_names import DEFAULT_GROUP, group_name
@@ -212,6 +213,22 @@ class Sky(Parametrized, FarLight):
         pixels[ROWS // 2 :] = below.ravel()
         table = ImageEnvironment.of(pixels, "nearest", rotation)
         self._light = SkyLight(self.model, shade, below, self.up.astype(f4), self.sun.astype(f4), table)
+
+    def _transformed(self, matrix: Doubles) -> Self:
+        """Return a copy that is turned by an affine matrix (4, 4)."""
+        turn = rotation_matrix("Sky transform", matrix[:3, :3])
+        return self._turned_to(turn @ self.sun, turn @ self.up)
+
+    def _placed_as(self, other: Self) -> Self:
+        """Return a copy that is turned as another sky."""
+        return self._turned_to(other.sun, other.up)
+
+    def _turned_to(self, sun: ArrayLike, up: ArrayLike) -> Self:
+        """Return a copy with other directions; both are set at once, as each alone may be impossible."""
+        light = copy(self)
+        vars(light).update(sun=sun, up=up)
+        light.derive()
+        return light
 
     @classmethod
     @suggests_keywords
