@@ -159,6 +159,7 @@ class Light(Moving, ABC):
         placing = transform if self.motion is None else product(transform, self.motion)
         assert isinstance(placing, Motion)
         rest = vars(self).get("_rest", self)
+        rest._transformed(placing.at(placing.end))  # raises where the motion cannot carry it
         light = self._placed_as(rest._transformed(placing.at(placing.start)))
         vars(light).update(motion=placing, _rest=rest)
         return light
