@@ -103,9 +103,24 @@ def test_an_environment_turns_as_its_transform_does(name):
     np.testing.assert_allclose(carried._transform, SPIN.at(0.4)[:3, :3], atol=1e-12)
 
 
-@pytest.mark.slow
 def test_an_environment_at_a_time_draws_directions_by_its_density():
-    wf.testing.check_light(wf.Environment(PIXELS, transform=SPIN).at(0.4), seed=1)
+    """Chi-square over the texels, within which the density is constant."""
+    count, turn = 1 << 17, SPIN.at(0.4)[:3, :3]
+    sky = wf.Environment(PIXELS, transform=SPIN).at(0.4).record(np.zeros(3))
+    u = np.random.default_rng(11).random((2, count)).astype(np.float32)
+    x, y, z = turn.T @ sky.sample_li(np.zeros((3, count), np.float32), u).wi.astype(float)
+    column = ((0.5 - np.arctan2(x, z) / (2 * np.pi)) % 1 * 16).astype(int)
+    row = np.minimum(np.arccos(np.clip(y, -1, 1)) / np.pi * 8, 7).astype(int)
+    drawn = np.bincount(16 * row + column, minlength=128)
+    rows, columns = (each.ravel() for each in np.mgrid[:8, :16])
+    polar, longitude = (rows + 0.5) * np.pi / 8, 2 * np.pi * (0.5 - (columns + 0.5) / 16)
+    middle = np.sin(polar) * np.sin(longitude), np.cos(polar), np.sin(polar) * np.cos(longitude)
+    solid = np.pi / 8 * (np.cos(rows * np.pi / 8) - np.cos((rows + 1) * np.pi / 8))
+    density = sky.pdf_li(np.zeros((3, 128), np.float32), (turn @ middle).astype(np.float32))
+    due = density.astype(float) * solid * count
+    assert due.sum() == pytest.approx(count, rel=1e-5)
+    statistic = ((drawn - due) ** 2 / due).sum()
+    assert abs(statistic - 127) < 4 * np.sqrt(2 * 127)
 
 
 def test_radiance_that_is_assigned_to_a_turning_environment_turns():
