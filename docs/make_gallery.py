@@ -4,12 +4,14 @@ python docs/make_gallery.py [name ...]
 
 Each picture is what `python examples/NAME.py --size SIZE --spp SPP` renders, as a jpg, denoised where the
 table says so. A card is the middle of it, 480 by 320 pixels. It needs pyoidn, and minutes for each picture.
-The name `tutorial` stands for the pictures on the tutorial's start page, and `figures` for those of a course.
+The name `tutorial` stands for the pictures on the tutorial's start page, `figures` for those of a course,
+and `how_to` for pictures of how-to pages, each made by the page's first block of code in a larger size.
 """
 
 from __future__ import annotations
 
 import contextlib
+import re
 import runpy
 import sys
 import tempfile
@@ -28,12 +30,12 @@ PICTURES = {  # size, samples per pixel, whether it is denoised, whether it has 
     "interior": (1200, 24, True, True),
     "scan": (1200, 5, True, True),
     "fruit": (1200, 14, True, True),
-    "photograph": (1200, 4, True, True),
+    "photograph": (1200, 24, True, True),
     "caustics": (1200, 32, True, True),
     "fog": (1200, 8, True, False),
-    "milk": (600, 64, True, False),
+    "milk": (1200, 64, True, False),
     "cornell_box": (1200, 32, True, True),
-    "course_spheres": (1200, 10, True, True),
+    "course_spheres": (1200, 40, True, True),
     "spheres": (1200, 24, True, True),
     "molecule": (1200, 32, True, True),
     "cuboids": (1200, 24, True, True),
@@ -47,6 +49,20 @@ PICTURES = {  # size, samples per pixel, whether it is denoised, whether it has 
     "layers": (297, 96, False, False),
     "estimators": (300, 32, False, False),
     "default_look": (1200, 32, True, False),
+}
+HOW_TO = {  # the file that a page's first block saves, and what is larger or finer in its picture
+    "hdri": ("ball.jpg", {"size=(320, 240)": "size=(1200, 900)", "spp=64": "spp=64, denoise=True"}),
+    "light": ("lit.jpg", {"size=(320, 240)": "size=(1200, 900)", "spp=64": "spp=64, denoise=True"}),
+    "material": ("balls.jpg", {"size=(400, 225)": "size=(1200, 675), denoise=True"}),
+    "mesh": ("part.jpg", {"size=(320, 240)": "size=(1200, 900), denoise=True"}),
+    "photograph": (
+        "composed.jpg",
+        {"(320, 240)": "(1200, 900)", "(240, 320, 3)": "(900, 1200, 3)", "100:": "375:", "140)": "525)"},
+    ),
+    "solar_panel": (
+        "panel.jpg",
+        {"(28, 22)": "(84, 66)", "spp=64": "spp=256", 'bbox_inches="tight"': 'bbox_inches="tight", dpi=215'},
+    ),
 }
 render = wf.render
 
@@ -96,6 +112,20 @@ def make_figures() -> None:
         picture.save(DOCS / "figures" / f"{name}.jpg", quality=QUALITY, optimize=True, progressive=True)
 
 
+def make_how_to() -> None:
+    """Run the first block of how-to pages in a larger size, and write the picture that it saves."""
+    for page, (name, larger) in HOW_TO.items():
+        text = (DOCS / "how_to" / f"{page}.md").read_text("utf-8")
+        code = re.search(r"^```python\n(.*?)^```$", text, re.MULTILINE | re.DOTALL)[1]
+        for shown, finer in larger.items():
+            assert shown in code, f"{page}.md has no {shown}"
+            code = code.replace(shown, finer)
+        with tempfile.TemporaryDirectory() as folder, contextlib.chdir(folder):
+            exec(compile(code, page, "exec"), {"__name__": "__main__"})
+            picture = Pillow.open(name).convert("RGB")
+        picture.save(DOCS / "how_to" / f"{page}.jpg", quality=QUALITY, optimize=True, progressive=True)
+
+
 def middle(picture: Pillow.Image) -> Pillow.Image:
     """Return the largest part in the middle of a picture that has the shape of a card."""
     width, height = picture.size
@@ -108,6 +138,6 @@ if __name__ == "__main__":
     sys.path[:0] = [str(ROOT / "examples"), str(DOCS / "tutorial")]  # some use parts of others
     (DOCS / "cards").mkdir(exist_ok=True)
     (DOCS / "figures").mkdir(exist_ok=True)
-    special = {"tutorial": make_tutorial, "figures": make_figures}
+    special = {"tutorial": make_tutorial, "figures": make_figures, "how_to": make_how_to}
     for name in sys.argv[1:] or [*PICTURES, *special]:
         special[name]() if name in special else make(name)
