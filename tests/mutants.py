@@ -199,37 +199,40 @@ TESTS |= {
         *["lights"] * ("/lights/" in file and not file.endswith(CHOICES)),
     )
 }
-# what features concern beside their order: tests in rooms of their subject
-ROOMS_OF_FEATURES = {
+# for each file of features/, tests beside those of their order
+TESTS_OF_FEATURES = {
     "absorption": "materials/test_absorption.py",
     "alpha": "materials/test_alpha.py",
     "background": "scene/test_background.py",
     "black_lights": "scene/test_scene.py",
     "branches": "integrators/test_branches.py",
-    "caustics": "integrators/test_caustics.py",
+    "caustics": "integrators/test_light_tracing.py",
     "compiling": "scene/test_scene.py",
     "dispersion": "bsdfs/test_channels.py",
     "guide": "guiding",
     "instances": "shapes/test_instances.py",
-    "interpolation": "textures",
-    "media": "media",
-    "motion": "motion",
-    "nested": "media",
-    "normal_maps": "textures",
+    "interpolation": "scene/test_scene.py",
+    "media": "media/test_media.py",
+    "motion": "motion/test_held_places.py motion/test_motion_blur.py::test_blurred_picture_is_the_mean_of_stills",
+    "nested": "media/test_media.py",
+    "normal_maps": "textures/test_normal_maps.py",
     "passing": "materials/test_alpha.py",
-    "receivers": "lights",
+    "receivers": "lights/test_receivers.py",
     "shadow_catchers": "bsdfs/test_shadow_catcher.py",
     "shadow_terminator": "features/test_shadow_terminator.py",
     "unseen": "materials/test_visible_to_camera.py",
     "view": "physics/test_equal_means.py",
 }
 TESTS |= {
-    f"wavefront/features/{name}.py": ("tests/features/test_order.py", f"tests/{room}")
-    for name, room in ROOMS_OF_FEATURES.items()
+    f"wavefront/features/{name}.py": (
+        "tests/features/test_order.py",
+        *(f"tests/{each}" for each in tests.split()),
+    )
+    for name, tests in TESTS_OF_FEATURES.items()
 }
 FILES_OF = {
     "densities": DENSITIES,
-    "features": [f"wavefront/features/{name}.py" for name in ROOMS_OF_FEATURES],
+    "features": [f"wavefront/features/{name}.py" for name in TESTS_OF_FEATURES],
 }
 UNUSABLE = 6  # status of a mutant that cannot be imported, beside those of pytest
 CONSTANTS = (bool, int, float, str, tuple, list, dict, np.generic, np.ndarray)

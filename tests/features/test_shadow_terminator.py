@@ -62,6 +62,15 @@ def test_instances_have_it_as_meshes_do(mirror) -> None:
     assert ((one > 0.02) != (two > 0.02)).mean() < 2e-3
 
 
+def test_rays_start_at_one_place_whatever_else_is_in_the_wave() -> None:
+    """Where other rays cross their surfaces, all origins are computed anew."""
+    camera = wf.Camera.orthographic((0, 0, 5), (0, 0, 0), (0, 1, 0), height=2.2, size=(16, 16))
+    sheet = wf.Rectangle((-2, -2, 2), (2, 0, 0), (0, 4, 0), material=wf.ThinDielectric(1.5))
+    scene = wf.Scene([ball(), sheet], [SUN, wf.Environment(1.0)], camera)
+    one, many = (wf.render(scene, **FAST, accel="numpy", wave_size=size).rgb for size in (5, 4096))
+    assert np.array_equal(one, many)
+
+
 def test_a_white_ball_in_a_white_sky_is_white() -> None:
     """No light is lost where normals disagree: before, about one in 1 000."""
     white = ball(wf.Diffuse(1.0))

@@ -30,7 +30,8 @@ from inside import (
     solid_angles,
     train,
 )
-from scenes import room
+from scenes import DIRECT_CASES, room
+from significance import assert_mean, measure
 from threadpoolctl import threadpool_info
 
 import wavefront as wf
@@ -345,6 +346,13 @@ def test_guided_pictures_agree_with_plain_ones_and_have_less_noise() -> None:
 
 
 @pytest.mark.usefixtures("short_training")
+def test_light_samples_are_weighted_by_what_a_table_draws(short_training: None) -> None:
+    """By densities of BSDFs alone the floor would be 1.4 times as bright."""
+    (case,) = (case for case in DIRECT_CASES if case.name == "half-hidden rectangle")
+    found = measure(case.build(), 64, guide=True, max_bounces=4)
+    assert_mean(found, case.expected, 0.005)
+
+
 def test_guided_pictures_do_not_depend_on_workers_or_waves() -> None:
     scene = lamp_at_the_ceiling()
     one = wf.render(scene, 4, guide=True, workers=1, progress=False)
