@@ -213,7 +213,8 @@ TESTS_OF_FEATURES = {
     "instances": "shapes/test_instances.py",
     "interpolation": "scene/test_scene.py",
     "media": "media/test_media.py",
-    "motion": "motion/test_held_places.py motion/test_motion_blur.py::test_blurred_picture_is_the_mean_of_stills",
+    "motion": "motion/test_held_places.py "
+    "motion/test_motion_blur.py::test_blurred_picture_is_the_mean_of_stills",
     "nested": "media/test_media.py",
     "normal_maps": "textures/test_normal_maps.py",
     "passing": "materials/test_alpha.py",
