@@ -125,6 +125,21 @@ def test_copies_of_the_scene_move_as_it_does(tmp_path: Path) -> None:
         assert still.camera.origin.tolist() == [0, 0, 7]
 
 
+def test_a_camera_that_moves_is_blurred(tmp_path: Path) -> None:
+    passing = CAMERA.replace("10: (0, 0, 5), 30: (0, 0, 9)", "10: (-2, 0, 5), 30: (3, 0, 5)")
+    scene = wf.load(stage(tmp_path, STILL + passing.replace("30: 100", "30: 50")))
+    given: Any = {"size": (24, 16), "progress": False, "workers": 1, "lighting": None}
+    scene.add(wf.Environment(1))
+    blurred = wf.render(scene, 128, aovs="alpha", shutter=(1.5, 2.5), **given).alpha
+    times = 1.5 + (np.arange(16) + 0.5) / 16
+    stills = [wf.render(scene.at(time), 8, aovs="alpha", **given).alpha for time in times]
+    assert np.abs(blurred - np.mean(stills, 0)).max() < 0.12
+    of_user = wf.Camera.look_at((0, 0, 9), (0, 0, 0))
+    wf.render(scene, 1, camera=of_user, shutter=(1.5, 2.5), **given)
+    still = wf.render(scene, 1, shutter=(9, 10), **given)  # all is over
+    np.testing.assert_array_equal(still.rgb, wf.render(scene.at(9), 1, **given).rgb)
+
+
 def test_a_moment_is_what_is_read_at_its_time(tmp_path: Path) -> None:
     path = stage(tmp_path, STILL + BENT + LAMP)
     given: Any = {"spp": 2, "size": (12, 8), "progress": False, "workers": 1, "view": "front"}

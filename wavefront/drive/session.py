@@ -23,6 +23,7 @@ from ..film.picture_sums import PictureSums
 from ..image import Image
 from ..integrators.stage_list import StageList
 from ..io.to_scene import as_scene, choose_camera, coloring_of
+from ..scene import Scene
 from ..settings import RenderSettings, Settings, describes_settings, takes_settings
 from ..workers.machine import reserve_buffers
 from ..workers.pool import WorkerPool
@@ -149,7 +150,12 @@ class Session:
         reserve_buffers(1)
         values = settings.values
         camera, framed = choose_camera(
-            scene, values["camera"], values["size"], values["up"], values["view"], values["fov"]
+            scene,
+            values["camera"] or _camera_of_file(scene, settings),
+            values["size"],
+            values["up"],
+            values["view"],
+            values["fov"],
         )
         # before work, for the least demand; again when the memory of the scene is known
         make_budget(settings, camera.size, values["executor"] or "threads")
@@ -525,3 +531,10 @@ class Session:
         error = self._picture.keep(self.command)
         if error is not None:
             warn_caller(f"the checkpoint was not written: {error}")
+
+
+def _camera_of_file(scene: Scene, settings: Settings) -> Camera | None:
+    """Return the camera of a file that is read anew for each time, as it moves while the shutter is open."""
+    if scene.file_moments is None or settings.shutter is None:
+        return None
+    return scene.file_moments.camera_between(scene, settings.shutter.begin, settings.shutter.end)

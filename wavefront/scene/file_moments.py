@@ -11,8 +11,10 @@ from ..camera import Camera
 from ..core.errors import SceneError
 from ..core.fingerprint import fingerprint
 from ..lights import Light
+from ..motion import Keyframes
 from ..shapes import Shape
 
+KEYS = 9  # of the motion of a camera
 FEW = 5  # times that say how far a scene reaches
 
 if TYPE_CHECKING:
@@ -58,6 +60,23 @@ class FileMoments:
         lights += [light.at(time) for light in scene.lights if id(light) not in mine]
         is_of_file = scene.camera is self._camera
         return shapes, lights, fresh.camera if is_of_file else scene.camera and scene.camera.at(time)
+
+    def camera_between(self, scene: Scene, begin: float, end: float) -> Camera | None:
+        """Return the camera of a scene as it moves between two times, s: that of the file by its places then.
+
+        A camera that was not read from the file is returned as it is.
+        """
+        if self._camera is None or scene.camera is not self._camera:
+            return scene.camera
+        times = np.linspace(begin, end, KEYS)
+        cameras = [camera for time in times.tolist() if (camera := scene.at(time).camera) is not None]
+        places = np.array([camera.to_matrix() for camera in cameras])
+        if len(cameras) < KEYS or (places == self._camera.to_matrix()).all():
+            return scene.camera
+        middle = KEYS // 2
+        ways = Keyframes(times, places @ np.linalg.inv(places[middle]))
+        moving: Camera = cameras[middle].transformed(ways)
+        return moving
 
 
 def _made_of(element: Shape | Light) -> str | None:
