@@ -61,7 +61,7 @@ HOW_TO = {  # the file that a page's first block saves, and what is larger or fi
     ),
     "solar_panel": (
         "panel.jpg",
-        {"(28, 22)": "(84, 66)", "spp=64": "spp=256", 'bbox_inches="tight"': 'bbox_inches="tight", dpi=215'},
+        {"(28, 22)": "(84, 66)", "spp=64": "spp=256", 'bbox_inches="tight"': 'bbox_inches="tight", dpi=208'},
     ),
 }
 render = wf.render
@@ -123,7 +123,7 @@ def make_how_to() -> None:
         with tempfile.TemporaryDirectory() as folder, contextlib.chdir(folder):
             exec(compile(code, page, "exec"), {"__name__": "__main__"})
             picture = Pillow.open(name).convert("RGB")
-        picture.save(DOCS / "how_to" / f"{page}.jpg", quality=QUALITY, optimize=True, progressive=True)
+        picture.save(DOCS / "how_to" / f"{page}.jpg", quality=70, optimize=True, progressive=True)
 
 
 def middle(picture: Pillow.Image) -> Pillow.Image:

@@ -57,8 +57,9 @@ def few_samples(tmp_path, monkeypatch, short_training):
     def quick_many(scene, cameras, spp=MOST_SPP, **options):
         return render_many(scene, cameras, min(spp, MOST_SPP), progress=False, **options)
 
-    def quick_measure(*arguments, spp=4, **options):
-        return measure(*arguments, spp=min(spp, 4), **options)
+    def quick_measure(*arguments, **options):
+        few = {} if options.keys() & {"samples", "noise"} else {"spp": min(options.get("spp", 64), 64)}
+        return measure(*arguments, **options | few)
 
     monkeypatch.setattr(wf, "measure", quick_measure)
     monkeypatch.setattr(wf, "render", quick)
