@@ -418,7 +418,10 @@ def mixed_scene():
         "shared": of(carried(box, gold), walls, reuse=True),
         "shared in glass": of(carried(box, gold), carried(ball, amber).translated((1, 0.5, 0)), reuse=True),
         "direct": of(carried(box, gold), integrator="direct_mis"),
-        "naive": of(carried(box, gold), integrator="naive"),
+        "naive": (
+            wf.Scene([floor(), lamp, carried(box, gold)], lights()[1:], view()),
+            {"integrator": "naive"},
+        ),
     }
 
 
@@ -433,6 +436,39 @@ def test_blurred_pictures_are_means_of_stills_with_all_else(name, accel):
     strata = 16 if "guide" in settings else 64  # each still has a training of its own
     assert_mean_of_stills(
         scene, runs=6, strata=strata, spp=64, still_spp=64 // strata, accel=accel, max_error=0.05, **settings
+    )
+
+
+def crossed():
+    """What else moves than instances, with what light does beside it: scenes and settings by both names."""
+    vertices, faces = blob()
+    lamp = wf.Rectangle((-0.6, 2, -0.6), (1.2, 0, 0), (0, 0, 1.2), emission=6)
+    moving = {
+        "camera": wf.Scene([floor(), lamp, wf.Box((0, 0, 0), 0.8)], [], SCENES["camera"].camera),
+        "deforming": wf.Scene([floor(), lamp, wf.Mesh(vertices, faces, times=[0, 0.3, 1])], [], view()),
+        "lamp": wf.Scene([floor(), lamp.transformed(TURN), wf.Box((0, 0, 0), 0.8)], [], view()),
+    }
+    ball = wf.Sphere((-0.9, 0.1, 1), 0.5, material=wf.Dielectric(1.5))
+    found = {"camera, shared": (moving["camera"], {"reuse": True})}
+    for name, scene in moving.items():
+        fog = wf.Scene(scene.shapes, [], scene.camera, medium=wf.Medium(scattering=0.1))
+        found[f"{name}, glass"] = wf.Scene([*scene.shapes, ball], [], scene.camera), {}
+        found[f"{name}, fog"] = fog, {}
+        found[f"{name}, guide"] = scene, {"guide": True}
+        found[f"{name}, branches"] = scene, {"branches": 4}
+    return found
+
+
+CROSSED = crossed()
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", CROSSED)
+def test_each_motion_goes_with_all_else(name):
+    scene, settings = CROSSED[name]
+    strata = 16 if "guide" in settings else 64
+    assert_mean_of_stills(
+        scene, runs=4, strata=strata, spp=64, still_spp=64 // strata, max_error=0.05, **settings
     )
 
 

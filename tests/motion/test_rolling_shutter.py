@@ -132,6 +132,13 @@ def test_rows_of_guided_and_branching_paths_are_means_of_stills(options):
     assert_mean_of_stills(scenes()["glass"], 8, 32, 8, rows=(0, 5), **options)
 
 
+@pytest.mark.slow
+def test_rows_in_fog_are_means_of_stills():
+    scene = scenes()["instance"]
+    fog = wf.Scene(scene.shapes, scene.lights, scene.camera, medium=wf.Medium(scattering=0.05))
+    assert_mean_of_stills(fog, 8, 32, 8, rows=(0, 5))
+
+
 def test_aovs_are_those_of_the_times_of_rows():
     """Ids, depth and texture coordinates of each row are those of the still scene of its time."""
     shape = wf.Rectangle((-1, -2, 0), (2, 0, 0), (0, 4, 0)).transformed(way(1, 0, 1))
