@@ -449,13 +449,14 @@ def crossed():
         "lamp": wf.Scene([floor(), lamp.transformed(TURN), wf.Box((0, 0, 0), 0.8)], [], view()),
     }
     ball = wf.Sphere((-0.9, 0.1, 1), 0.5, material=wf.Dielectric(1.5))
-    found = {"camera, shared": (moving["camera"], {"reuse": True})}
+    found = {}
     for name, scene in moving.items():
         fog = wf.Scene(scene.shapes, [], scene.camera, medium=wf.Medium(scattering=0.1))
         found[f"{name}, glass"] = wf.Scene([*scene.shapes, ball], [], scene.camera), {}
         found[f"{name}, fog"] = fog, {}
         found[f"{name}, guide"] = scene, {"guide": True}
         found[f"{name}, branches"] = scene, {"branches": 4}
+        found[f"{name}, shared"] = scene, {"reuse": True}
     return found
 
 
