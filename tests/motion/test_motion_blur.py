@@ -415,7 +415,10 @@ def mixed_scene():
             {},
         ),
         "lamp in a room": (wf.Scene([walls, lamp.transformed(SLIDE)], [], view(origin=(0, 1, 1.8))), {}),
-        "shared": of(carried(box, gold), walls, reuse=True),
+        "shared": (
+            wf.Scene([walls, lamp, carried(box, gold)], [], view(origin=(0, 1, 1.8))),
+            {"reuse": True},
+        ),
         "shared in glass": of(carried(box, gold), carried(ball, amber).translated((1, 0.5, 0)), reuse=True),
         "direct": of(carried(box, gold), integrator="direct_mis"),
         "naive": (
