@@ -243,7 +243,7 @@ def test_no_light_is_lost_or_won(close_tiles: None) -> None:
     """In a closed white room of radiance 1 each sample is 1, whichever pixels it comes from."""
     inside = scenes.box((-1, -1, -1), (1, 1, 1), wf.Diffuse(0.5), emission=0.5, inward=True)
     scene = wf.Scene([inside], camera=wf.Camera.look_at((0, 0, 0), (1, 0.3, 0.2), fov=70, size=(16, 16)))
-    runs = repeat(scene, 4, max_bounces=40, reuse=True)
+    runs = repeat(scene, 16, max_bounces=40, reuse=True)
     assert_mean(Mean.of(runs.mean((1, 2, 3))), 1.0, 0.003)
 
 
