@@ -140,6 +140,32 @@ def test_a_camera_that_moves_is_blurred(tmp_path: Path) -> None:
     np.testing.assert_array_equal(still.rgb, wf.render(scene.at(9), 1, **given).rgb)
 
 
+SPOT = """def SphereLight "spot" (apiSchemas = ["ShapingAPI"])
+{
+    float inputs:intensity = 20000
+    bool treatAsPoint = true
+    float inputs:shaping:cone:angle = 25
+    double3 xformOp:translate.timeSamples = { 10: (-1, 0.5, 4), 30: (1.5, 0.5, 4) }
+    double xformOp:rotateY.timeSamples = { 10: -15, 30: 15 }
+    uniform token[] xformOpOrder = ["xformOp:translate", "xformOp:rotateY"]
+}
+"""
+
+
+def test_lights_and_balls_that_move_are_blurred(tmp_path: Path) -> None:
+    scene = wf.load(stage(tmp_path, STILL + SLID + SPOT))
+    assert isinstance(scene.lights[0], wf.SpotLight)
+    scene.add(wf.Rectangle((-3, -3, -1), (8, 0, 0), (0, 8, 0)), wf.Environment(0.05))
+    camera = wf.Camera.look_at((0.5, 0.5, 9), (0.5, 0.5, 0), fov=40, size=(24, 16))
+    given: Any = {"camera": camera, "progress": False, "workers": 1, "denoise": False, "lighting": None}
+    blurred = wf.render(scene, 256, shutter=(1, 3), **given).rgb
+    times = 1 + 2 * (np.arange(32) + 0.5) / 32
+    stills = np.mean([wf.render(scene.at(time), 8, **given).rgb for time in times], 0)
+    off = np.abs(blurred - stills).mean() / stills.mean()
+    assert off < 0.05
+    assert np.abs(wf.render(scene.at(2), 32, **given).rgb - stills).mean() / stills.mean() > 3 * off
+
+
 def test_a_moment_is_what_is_read_at_its_time(tmp_path: Path) -> None:
     path = stage(tmp_path, STILL + BENT + LAMP)
     given: Any = {"spp": 2, "size": (12, 8), "progress": False, "workers": 1, "view": "front"}

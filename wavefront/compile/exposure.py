@@ -10,11 +10,12 @@ import numpy as np
 
 from ..arrays.vec import Doubles
 from ..core.errors import SceneError, warn_caller
-from ..motion import Moving, Samples
+from ..motion import Keyframes, Moving, Samples
+from ..motion.quaternions import rotation_of
 from ..motion.shutter import Shutter
 from ..motion.steps import Matrices
 from ..scene import Scene
-from ..shapes import Instance, Mesh, Shape, Spheres
+from ..shapes import Instance, Mesh, Shape, Sphere, Spheres
 from ..shapes.transform import is_even
 from .motion import Exposed, Mover
 
@@ -71,8 +72,29 @@ def _sampled(scene: Scene, shutter: Shutter) -> Scene:
         warn_caller("shapes of the file come or go while the shutter is open; they are as in the middle")
         columns = [middle.shapes]
     sampled.shapes = [_over_time(list(shapes), times) for shapes in zip(*columns, strict=True)]
-    sampled.lights = middle.lights
+    sampled.lights, lights = middle.lights, [moment.lights for moment in moments]
+    if len({len(row) for row in lights}) == 1:
+        sampled.lights = [_light_over_time(list(row), times) for row in zip(*lights, strict=True)]
     return sampled
+
+
+def _light_over_time(lights: list[Any], times: Doubles) -> Any:
+    """Return a light that goes and turns as several do, of one kind, at each of some times.
+
+    Of a light with an axis, as those of files are, any turn that takes the axis along will do.
+    """
+    middle = lights[len(lights) // 2]
+    if all(light is middle for light in lights) or {type(light) for light in lights} != {type(middle)}:
+        return middle
+    ways = np.tile(np.eye(4), (len(times), 1, 1))
+    if hasattr(middle, "direction"):
+        before, after = middle.direction, np.stack([light.direction for light in lights])
+        quaternions = np.column_stack([np.cross(before, after), 1 + after @ before])
+        ways[:, :3, :3] = rotation_of(quaternions)
+    if hasattr(middle, "position"):
+        places = np.stack([light.position for light in lights])
+        ways[:, :3, 3] = places - (ways[:, :3, :3] * middle.position).sum(2)
+    return middle if (ways == np.eye(4)).all() else middle.transformed(Keyframes(times, ways))
 
 
 def _over_time(shapes: list[Shape], times: Doubles) -> Shape:
@@ -80,6 +102,12 @@ def _over_time(shapes: list[Shape], times: Doubles) -> Shape:
     middle = shapes[len(shapes) // 2]
     if all(shape is middle for shape in shapes):
         return middle
+    balls = [shape for shape in shapes if isinstance(shape, Sphere)]
+    if len(balls) == len(shapes) and len({float(ball.radius) for ball in balls}) == 1:
+        ways, places = np.tile(np.eye(4), (len(times), 1, 1)), np.stack([ball.center for ball in balls])
+        ways[:, :3, 3] = places - places[len(balls) // 2]
+        moving: Shape = middle.transformed(Keyframes(times, ways))
+        return moving
     meshes: list[Any] = [shape.to_mesh() if isinstance(shape, Instance) else shape for shape in shapes]
     first = meshes[0]
     for mesh in meshes:
