@@ -37,6 +37,16 @@ SHAPES = {
         wf.Sphere((0, 0, 0), 0.8, material=wf.Diffuse(STRIPES)).transformed(held(MOVED)),
         1e-5,
     ),
+    "textured sphere that is turned": (
+        wf.Sphere((0, 0, 0), 0.8, material=wf.Diffuse(STRIPES)).transformed(held(TURNED)),
+        1e-5,
+    ),
+    "textured sphere with a rotation": (
+        wf.Sphere((0, 0, 0), 0.8, material=wf.Diffuse(STRIPES), transform=np.eye(3)).transformed(
+            held(TURNED)
+        ),
+        1e-5,
+    ),
     "smooth mesh that deforms": (
         wf.Mesh(
             np.stack([BALL.vertices if time == 0.5 else FLAT for time in TIMES]),
@@ -72,3 +82,15 @@ def test_caustics_are_seen_from_where_the_camera_is_held() -> None:
     plain = wf.render(scene.at(0.1), 16, **{**options, "caustics": False}).rgb
     assert np.abs(still - plain).mean() > 0.02 * still.mean()
     assert np.abs(blurred - still).mean() < 1e-3 * still.mean()
+
+
+def test_textures_of_spheres_do_not_turn_with_them() -> None:
+    """As in stills; the spheres go along lines between some places."""
+    motion = wf.Keyframes([0, 0.5, 1], [np.eye(4), TURNED, np.diag([-1.0, 1, -1, 1])])
+    halves = wf.Diffuse(wf.Texture(np.repeat([[0.05, 0.9]], 4, 0), filter="nearest"))
+    ball = wf.Spheres([(0.5, 0, 0), (-0.5, 0.2, 0)], 0.5, material=halves).transformed(motion)
+    scene = wf.Scene([ball], [wf.Environment(1)], CAMERA)
+    options = {"workers": 1, "progress": False, "accel": "numpy", "max_bounces": 1, "branches": 1}
+    blurred = wf.render(scene, 64, shutter=(0, 1), **options).rgb
+    stills = [wf.render(scene.at(time), 4, **options).rgb for time in (np.arange(16) + 0.5) / 16]
+    assert np.abs(blurred - np.mean(stills, 0)).mean() < 0.02 * blurred.mean()

@@ -16,11 +16,13 @@ from ..motion.shutter import Shutter
 from ..motion.steps import Matrices
 from ..scene import Scene
 from ..shapes import Instance, Mesh, Shape, Sphere, Spheres
-from ..shapes.transform import is_even
+from ..shapes.transform import is_even, points_by
+from .materials import attributes_read
 from .motion import Exposed, Mover
 
 TIMES = 9  # samples of the time while the shutter is open
 MOST_STEPS = 16  # linear steps that approximate a deformation at most
+CARRIED = 64  # lines along which textured spheres go while the shutter is open
 STRAIGHT = 2.0**-12  # tolerance of such steps, relative to the shape
 FORMS = 33  # of an emitting mesh whose transform does not keep its shape
 EVEN = 1e-5  # relative difference of scales along two axes that does not matter for light
@@ -149,6 +151,10 @@ class _Forms:
             if then.emission is not None and not self._keeps_shape(shape):
                 return self.mover(*self._as_forms(shape))
             return self._of_mesh(shape, then, shape.mesh, _matrices(shape, shape.transform))
+        if isinstance(shape, Sphere) and shape.transform is None:
+            return then, Mover(self._unturned(shape, then))
+        if isinstance(shape, Spheres) and self._is_textured_and_rigid(shape):
+            return then, self._of_carried_spheres(shape, then)
         if shape.deformation is None:
             return then, Mover(_matrices(shape))
         if not isinstance(shape, Spheres):
@@ -187,6 +193,44 @@ class _Forms:
         times = np.linspace(self._shutter.begin, self._shutter.end, FORMS)
         mesh = _of_forms([shape.at(time).to_mesh() for time in times.tolist()], times)
         return mesh, mesh.at(self._shutter.middle)
+
+    def _is_textured_and_rigid(self, shape: Spheres) -> bool:
+        """Return whether spheres have a texture, which does not turn with them, and one size over time."""
+        if shape.deformation is not None or "uv" not in attributes_read([shape]):
+            return False
+        linear = _matrices(shape)(np.linspace(self._shutter.begin, self._shutter.end, TIMES))[:, :3, :3]
+        return bool(np.ptp(np.linalg.det(linear)) <= EVEN * np.abs(np.linalg.det(linear)).max())
+
+    def _unturned(self, sphere: Sphere, then: Any) -> Matrices:
+        """Return the matrices of a sphere without a rotation of its own, whose texture does not turn."""
+        carried, (center,) = _matrices(sphere), self._uncarried(sphere, then)
+
+        def matrices(times: Doubles) -> Doubles:
+            moved = carried(times)
+            scale = np.cbrt(np.abs(np.linalg.det(moved[:, :3, :3])))
+            unturned = np.zeros_like(moved)
+            unturned[:, :3, :3] = np.eye(3) * scale[:, None, None]
+            unturned[:, :3, 3] = moved[:, :3, :3] @ center + moved[:, :3, 3] - scale[:, None] * center
+            unturned[:, 3, 3] = 1
+            return unturned
+
+        return matrices
+
+    def _of_carried_spheres(self, shape: Spheres, then: Any) -> Mover:
+        """Return the motion of spheres that a motion carries, but does not turn."""
+        matrices, places = _matrices(shape), self._uncarried(shape, then)
+        keys = np.linspace(self._shutter.begin, self._shutter.end, CARRIED + 1)
+        still = matrices(np.array([self._shutter.middle]))
+
+        def centers(time: float) -> Doubles:
+            return points_by(matrices(np.array([time])), places)
+
+        return Mover(lambda times: np.repeat(still, len(times), 0), centers=centers, keys=keys)
+
+    def _uncarried(self, shape: Sphere | Spheres, then: Any) -> Doubles:
+        """Return centers (n, 3) as they are before the motion carries them."""
+        back = np.linalg.inv(_matrices(shape)(np.array([self._shutter.middle]))).astype(np.float64)
+        return points_by(back, then.centers)
 
     def _of_spheres(self, shape: Spheres) -> Mover:
         """Return the motion of spheres that have places of their own over time."""
