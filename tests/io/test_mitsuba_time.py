@@ -93,7 +93,9 @@ def test_damaged_animations(tmp_path: Path, keys: str, message: str) -> None:
 
 
 def test_motion_of_what_cannot_move_is_left_out(tmp_path: Path) -> None:
-    sky = f'<emitter type="constant">{SLIDE}</emitter>'
-    with pytest.warns(UserWarning, match="constant"):
+    """A sky can turn, but not be stretched."""
+    stretched = SLIDE.replace('<rotate z="1" angle="90"/>', '<scale x="3"/>')
+    sky = f'<emitter type="constant">{stretched}</emitter>'
+    with pytest.warns(UserWarning, match="its motion left out"):
         scene = load(tmp_path, f'{sky}<shape type="cube"/>', strict=False)
     assert scene.duration == 0

@@ -207,7 +207,8 @@ class _Forms:
 
         def matrices(times: Doubles) -> Doubles:
             moved = carried(times)
-            scale = np.cbrt(np.abs(np.linalg.det(moved[:, :3, :3])))
+            x, y, z = moved[:, :3, 0].T
+            scale = np.sqrt(x * x + y * y + z * z)
             unturned = np.zeros_like(moved)
             unturned[:, :3, :3] = np.eye(3) * scale[:, None, None]
             unturned[:, :3, 3] = moved[:, :3, :3] @ center + moved[:, :3, 3] - scale[:, None] * center
