@@ -100,6 +100,7 @@ from wavefront.colors.spectrum import Y_INTEGRAL, blackbody_colors, blackbody_sp
 from wavefront.colors.transfer import linear_to_srgb, srgb_to_linear
 from wavefront.compile import absorption, scene
 from wavefront.compile.brightest import brightest_emitter
+from wavefront.compile.exposure import exposed_scene
 from wavefront.compile.materials import group_materials
 from wavefront.compile.media import PhaseBsdf
 from wavefront.compile.morton import BITS, MortonGrid

@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from inside import Shutter, exposed_scene
 
 import wavefront as wf
 
@@ -164,6 +165,19 @@ def test_lights_and_balls_that_move_are_blurred(tmp_path: Path) -> None:
     off = np.abs(blurred - stills).mean() / stills.mean()
     assert off < 0.05
     assert np.abs(wf.render(scene.at(2), 32, **given).rgb - stills).mean() / stills.mean() > 3 * off
+
+
+def test_a_lamp_that_spins_is_on_its_way_at_all_times(tmp_path: Path) -> None:
+    """Also where it points away from where it points in the middle of the time."""
+    spinning = SPOT.replace("{ 10: -15, 30: 15 }", "{ 10: 0, 30: 360 }")
+    scene, shutter = wf.load(stage(tmp_path, STILL + spinning)), Shutter(1, 3)
+    exposed = exposed_scene(scene, shutter)
+    times = np.linspace(1, 3, 33)
+    turns = exposed.lights[0](times)[:, :3, :3]
+    axes = turns @ turns[16].T @ exposed.scene.lights[0].direction
+    wanted = [scene.at(time).lights[0].direction for time in times.tolist()]
+    np.testing.assert_allclose(axes, wanted, atol=1e-6)
+    assert wanted[0] @ wanted[16] == pytest.approx(-1)
 
 
 def test_a_moment_is_what_is_read_at_its_time(tmp_path: Path) -> None:

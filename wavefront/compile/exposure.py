@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from copy import copy
+from itertools import accumulate
 from typing import Any
 
 import numpy as np
@@ -90,13 +91,20 @@ def _light_over_time(lights: list[Any], times: Doubles) -> Any:
         return middle
     ways = np.tile(np.eye(4), (len(times), 1, 1))
     if hasattr(middle, "direction"):
-        before, after = middle.direction, np.stack([light.direction for light in lights])
-        quaternions = np.column_stack([np.cross(before, after), 1 + after @ before])
-        ways[:, :3, :3] = rotation_of(quaternions)
+        ways[:, :3, :3] = _turns(np.stack([light.direction for light in lights]))
     if hasattr(middle, "position"):
         places = np.stack([light.position for light in lights])
         ways[:, :3, 3] = places - (ways[:, :3, :3] * middle.position).sum(2)
     return middle if (ways == np.eye(4)).all() else middle.transformed(Keyframes(times, ways))
+
+
+def _turns(axes: Doubles) -> Doubles:
+    """Return rotations (n, 3, 3) from the middle one of unit axes (n, 3) to each, on the way through all."""
+    quaternions = np.column_stack([np.cross(axes[:-1], axes[1:]), 1 + (axes[:-1] * axes[1:]).sum(1)])
+    steps = rotation_of(quaternions)
+    from_first = np.stack(list(accumulate(steps, lambda turn, step: step @ turn, initial=np.eye(3))))
+    turns: Doubles = from_first @ from_first[len(axes) // 2].T
+    return turns
 
 
 def _over_time(shapes: list[Shape], times: Doubles) -> Shape:
