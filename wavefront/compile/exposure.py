@@ -61,9 +61,10 @@ def exposed_scene(scene: Scene, shutter: Shutter | None) -> Exposed:
 
 
 def _sampled(scene: Scene, shutter: Shutter) -> Scene:
-    """Return a scene whose file is read anew for each time with meshes that deform in its place.
+    """Return a scene with motions of its own in place of a file that is read anew for each time.
 
-    They go along lines between the forms of some times. Other changes are left out.
+    Meshes deform along lines between their forms at some times; balls and lights go and turn between their
+    places then. Other changes are left out.
     """
     if scene.file_moments is None:
         return scene
@@ -206,8 +207,9 @@ class _Forms:
         """Return whether spheres have a texture, which does not turn with them, and one size over time."""
         if shape.deformation is not None or "uv" not in attributes_read([shape]):
             return False
-        linear = _matrices(shape)(np.linspace(self._shutter.begin, self._shutter.end, TIMES))[:, :3, :3]
-        return bool(np.ptp(np.linalg.det(linear)) <= EVEN * np.abs(np.linalg.det(linear)).max())
+        times = np.linspace(self._shutter.begin, self._shutter.end, TIMES)
+        volumes = np.linalg.det(_matrices(shape)(times)[:, :3, :3])
+        return bool(np.ptp(volumes) <= EVEN * np.abs(volumes).max())
 
     def _unturned(self, sphere: Sphere, then: Any) -> Matrices:
         """Return the matrices of a sphere without a rotation of its own, whose texture does not turn."""
