@@ -320,7 +320,7 @@ def test_the_command_turns_the_view_meanwhile(tmp_path: Path) -> None:
         places.append([wf.Image.load(pattern.format(k)).rgb for k in (0, 1)])
     assert (places[0][1] != places[1][1]).any()
     out = str(tmp_path / "blurred_{}.npz")
-    assert main(["animate", path, "-o", out, "--fps", "2", "--open", "1", *OPTIONS]) == 0
+    assert main(["animate", path, "-o", out, "--fps", "2", "--shutter", "1", *OPTIONS]) == 0
     assert (wf.Image.load(out.format(0)).rgb != places[0][0]).any()
 
 
@@ -333,8 +333,7 @@ def test_the_command_turns_the_view_meanwhile(tmp_path: Path) -> None:
         (["--animation", "7"], "animation is 7; it must be at least 0 and below 2"),
         (["--end", "0"], "nothing moves for longer than a picture; give --turntable or --end"),
         (["--fps", "0"], "fps is 0"),
-        (["--shutter", "0:1"], "--shutter is for one picture; --open is the part"),
-        (["--open", "0"], "--open is 0.0; it must be above 0"),
+        (["--shutter", "0"], "shutter is 0.0; it must be above 0"),
         (["-o", "a.webm"], "extension is '.webm'"),
     ],
 )

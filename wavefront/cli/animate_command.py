@@ -40,12 +40,12 @@ def add_animate_command(commands: object) -> None:
     command.add_argument("--fps", type=float, default=24.0, help="pictures per second of the file")
     command.add_argument("--start", type=float, help="seconds of the file (default: where it begins to move)")
     command.add_argument("--end", type=float, help="seconds of the file (default: where all motion is over)")
-    shutter_help = "part of the time of a picture for which the shutter is open, such as 0.5"
-    command.add_argument("--open", type=float, metavar="PART", help=shutter_help)
     command.add_argument(
         "--turntable", type=float, default=0.0, help="degrees by which the view turns meanwhile"
     )
-    add_settings_of_series(command)
+    add_settings_of_series(command, own=("shutter",))
+    shutter_help = "part of the time of a picture for which the shutter is open, such as 0.5"
+    command.add_argument("--shutter", type=float, metavar="PART", help=shutter_help)
     command.set_defaults(run=_animate)
 
 
@@ -66,11 +66,7 @@ def _animate(options: argparse.Namespace) -> int:
             f"{options.scene}: nothing moves for longer than a picture; give --turntable or --end"
         )
     settings = {"progress": progress, **setting_values(options)}
-    if settings.get("shutter") is not None:
-        raise SceneError("--shutter is for one picture; --open is the part of the time of each picture")
-    open_for = None if options.open is None else number("--open", options.open, lambda x: x > 0, "above 0")
-    settings |= {"fps": options.fps, "shutter": open_for}
-    images = render_frames(_turning(scene, options, start, end), times, **settings)
+    images = render_frames(_turning(scene, options, start, end), times, fps=options.fps, **settings)
     written = save_animation(options.output, images, fps=options.fps, **display)
     print_done(f"{options.output}: {plural(written, 'picture')}")
     return 0

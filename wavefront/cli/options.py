@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import argparse
 import os
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Collection, Sequence
 from typing import Any
 
 import numpy as np
@@ -246,11 +246,11 @@ RENDER_OPTIONS = [name for name, setting in SETTINGS.items() if setting.option a
 DISPLAY_OPTIONS = ("gamma", "exposure", "tone", "white_balance")
 
 
-def add_settings(command: argparse.ArgumentParser) -> None:
-    """Add an option for each setting that has one, and those of reading a scene."""
+def add_settings(command: argparse.ArgumentParser, own: Collection[str] = ()) -> None:
+    """Add the options of reading a scene, and of settings, but for the command's own."""
     add_reading(command)
     for name, setting in SETTINGS.items():
-        if setting.option:
+        if setting.option and name not in own:
             _add_setting(command, name, setting)
     command.add_argument(
         "--color",

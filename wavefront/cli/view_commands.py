@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+from collections.abc import Collection
 from typing import Any
 
 from ..animation import check_animation, save_animation
@@ -127,9 +128,9 @@ def _dataset(options: argparse.Namespace) -> int:
     return 0
 
 
-def add_settings_of_series(command: argparse.ArgumentParser) -> None:
-    """Add the options of commands that render several pictures."""
-    add_settings(command)
+def add_settings_of_series(command: argparse.ArgumentParser, own: Collection[str] = ()) -> None:
+    """Add the options of commands that render several pictures, but for the command's own."""
+    add_settings(command, own)
     add_display(command)
     command.add_argument("--quiet", action="store_true", help="no progress bar")
 
