@@ -84,6 +84,7 @@ TAKEN = [
     lambda: SCENE.framing_camera(direction="Three-Quarter"),
     lambda: wf.Camera.framing(BALL, view="isometric", size=16),
     lambda: IMAGE["rgb"],
+    lambda: wf.Keyframes([0, 1], [(0, 0, 0), (1, 0, 0)]),
 ]
 
 
@@ -169,6 +170,19 @@ GUESSES = [
     ("wf.Diffuse(0.5, alpha=0.3)", "wf.Material(bsdf, alpha=...)"),
     ("wf.Camera(eye=(0, 0, 5))", "wf.Camera.look_at(origin, target, up"),
     ("wf.Camera.framing(BALL, fovy=30)", "'fov'"),
+    ("wf.render(BALL, time=1)", "write wf.load(path, time=...) or scene.at(time)"),
+    ("wf.render(BALL, fps=24)", "wf.render_frames(scene, fps=...)"),
+    ("wf.render(BALL, animation='Run')", "wf.load(path, animation=...)"),
+    ("wf.render(BALL, motion_blur=0.5)", "'shutter'"),
+    ("wf.render(BALL, shutter=0.5)", "it must be (from, until), seconds of the scene"),
+    ("wf.render_frames(BALL, frames=8)", "'times'"),
+    ("wf.load('a.glb', frame=3)", "time=, in seconds"),
+    ("SCENE.set_time(1)", "scene.at(time)"),
+    ("wf.animate(BALL)", "'render_frames'"),
+    ("wf.save_video('a.mp4', [])", "'save_animation'"),
+    ("wf.Keyframes([0, 1], translations=[(0, 0, 0), (1, 0, 0)])", "'matrices'"),
+    ("wf.Instance('a.obj', np.eye(4))", "write wf.load_mesh(path)"),
+    ("wf.Instance.many(BOX, [np.eye(4)])", "write wf.from_trimesh(mesh).shapes[0]"),
 ]
 
 
@@ -192,6 +206,9 @@ def test_values_that_are_understood_mean_what_they_say() -> None:
     assert np.array_equal(plastic.base_color.ravel(), wf.srgb("lightblue"))
     assert wf.Camera.look_at(*HERE, size=np.int64(16)).size == (16, 16)
     assert wf.to_photometric(2.0) == 2 * 683
+    moved = np.tile(np.eye(4), (2, 1, 1))
+    moved[1, :3, 3] = 1, 2, 3
+    assert np.array_equal(wf.Keyframes([0, 1], [(0, 0, 0), (1, 2, 3)]).matrices, moved)
     views = (SCENE.framing_camera(direction=each).origin for each in ("iso", "isometric"))
     assert np.array_equal(*views)
 

@@ -570,9 +570,7 @@ class Camera(Moving, Answers):
         Examples
         --------
         >>> camera = wf.Camera.look_at((0, 0, 4), (0, 0, 0))
-        >>> aside = np.eye(4)
-        >>> aside[0, 3] = 1
-        >>> dolly = camera.transformed(wf.Keyframes([0, 2], [np.eye(4), aside]))
+        >>> dolly = camera.transformed(wf.Keyframes([0, 2], [(0, 0, 0), (1, 0, 0)]))
         >>> dolly.at(1).origin.tolist()
         [0.5, 0.0, 4.0]
         """

@@ -89,9 +89,8 @@ def render_frames(  # type: ignore[misc]  # its shutter is a part of a frame
 
     Examples
     --------
-    >>> aside = np.eye(4)
-    >>> aside[0, 3] = 1
-    >>> ball = wf.Sphere((0, 0, 0), 1).transformed(wf.Keyframes([0, 0.5], [np.eye(4), aside]))
+    >>> aside = wf.Keyframes([0, 0.5], [(0, 0, 0), (1, 0, 0)])
+    >>> ball = wf.Sphere((0, 0, 0), 1).transformed(aside)
     >>> scene = wf.Scene([ball], wf.Environment(1))
     >>> [image.shape for image in wf.render_frames(scene, spp=1, fps=4, size=(16, 16))]
     [(16, 16, 3), (16, 16, 3)]

@@ -145,9 +145,8 @@ class Light(Moving, ABC):
 
         Examples
         --------
-        >>> aside = np.eye(4)
-        >>> aside[0, 3] = 2
-        >>> lamp = wf.PointLight((0, 3, 0), 40).transformed(wf.Keyframes([0, 1], [np.eye(4), aside]))
+        >>> aside = wf.Keyframes([0, 1], [(0, 0, 0), (2, 0, 0)])
+        >>> lamp = wf.PointLight((0, 3, 0), 40).transformed(aside)
         >>> lamp.at(0.5).position.tolist(), lamp.moves
         ([1.0, 3.0, 0.0], True)
         """

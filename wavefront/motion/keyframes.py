@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..arrays.vec import Doubles
-from ..core.errors import SceneError, finite_array
+from ..core.errors import SceneError, as_array, finite_array
 from ..core.plural import plural
 from ..core.suggestions import suggests_keywords
 from .motion import Motion
@@ -105,7 +105,7 @@ class Keyframes(Trs):
     times
         (k,) seconds, rising. Before the first and after the last, their matrices hold.
     matrices
-        (k, 4, 4) affine matrices, for column vectors.
+        (k, 4, 4) affine matrices, for column vectors; or (k, 3) translations.
 
     Raises
     ------
@@ -122,9 +122,7 @@ class Keyframes(Trs):
 
     Examples
     --------
-    >>> right = np.eye(4)
-    >>> right[0, 3] = 2
-    >>> slide = wf.Keyframes([0, 1], [np.eye(4), right])
+    >>> slide = wf.Keyframes([0, 1], [(0, 0, 0), (2, 0, 0)])
     >>> slide.at(0.25)[:3, 3].tolist()
     [0.5, 0.0, 0.0]
     >>> scene = wf.Scene([wf.Sphere((0, 0, 0), 1).transformed(slide), wf.Plane((0, -1, 0), (0, 1, 0))])
@@ -135,7 +133,7 @@ class Keyframes(Trs):
     @suggests_keywords
     def __init__(self, times: ArrayLike, matrices: ArrayLike) -> None:
         keys = rising("Keyframes times", times)
-        given = finite_array("Keyframes matrices", matrices, (None, 4, 4))
+        given = _matrices("Keyframes matrices", matrices)
         if len(given) != len(keys):
             raise SceneError(f"Keyframes has {plural(len(keys), 'time')} and {len(given)} matrices")
         _check("Keyframes matrices", given)
@@ -147,6 +145,16 @@ class Keyframes(Trs):
     def __repr__(self) -> str:
         """Return the number of keys, and the times of the first and the last."""
         return f"<Keyframes: {plural(len(self.times), 'key')} from {self.start:g} to {self.end:g} s>"
+
+
+def _matrices(name: str, given: ArrayLike) -> Doubles:
+    """Return matrices (k, 4, 4), which may be given as translations (k, 3)."""
+    values = as_array(name, given)
+    if values.ndim != 2 or values.shape[1] != 3:
+        return finite_array(name, given, (None, 4, 4))
+    matrices = np.tile(np.eye(4), (len(values), 1, 1))
+    matrices[:, :3, 3] = finite_array(name, given, (None, 3))
+    return matrices
 
 
 def _check(name: str, matrices: Doubles) -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from numbers import Real
 from typing import Any, TypeAlias
 
 import numpy as np
@@ -42,6 +43,11 @@ def check_shutter(name: str, value: Any) -> tuple[float, float] | None:
     """
     if value is None:
         return None
+    if isinstance(value, Real):
+        raise SceneError(
+            f"{name} is {in_brief(value)}; it must be (from, until), seconds of the scene; a part of "
+            "the time of a frame is for render_frames"
+        )
     begin, end = finite_array(name, value, (2,)).tolist()
     if not begin < end:
         raise SceneError(f"{name} is {in_brief(value)}; the shutter must be closed after it opens")

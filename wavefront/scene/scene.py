@@ -289,9 +289,8 @@ class Scene(Answers):
 
         Examples
         --------
-        >>> fall = np.tile(np.eye(4), (2, 1, 1))
-        >>> fall[0, 1, 3] = 2
-        >>> ball = wf.Sphere((0, 0, 0), 1).transformed(wf.Keyframes([0, 0.5], fall))
+        >>> fall = wf.Keyframes([0, 0.5], [(0, 2, 0), (0, 0, 0)])
+        >>> ball = wf.Sphere((0, 0, 0), 1).transformed(fall)
         >>> scene = wf.Scene([ball, wf.Plane((0, -1, 0), (0, 1, 0))])
         >>> scene.at(0.25).shapes[0].center.tolist()
         [0.0, 1.0, 0.0]

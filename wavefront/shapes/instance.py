@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from copy import copy
+from os import PathLike
 from typing import Any, Self, TypeVar
 
 import numpy as np
@@ -50,6 +51,20 @@ class Placing(Checked):
             instance.motion = motion
 
 
+def _check_mesh(name: str, mesh: Any) -> None:
+    """Raise a SceneError if what is to be placed is not a mesh; it says how to get one."""
+    if isinstance(mesh, Mesh):
+        return
+    hint = ""
+    if isinstance(mesh, list | tuple | Shape):
+        hint = "; wf.Group(...).placed(matrices) places shapes of all kinds"
+    elif isinstance(mesh, str | PathLike):
+        hint = "; write wf.load_mesh(path)"
+    elif hasattr(mesh, "vertices"):
+        hint = "; write wf.from_trimesh(mesh).shapes[0]"
+    raise SceneError(f"{name}: mesh must be a wf.Mesh, got {in_brief(mesh)}{hint}")
+
+
 class Instance(Shape):
     """A mesh placed by an affine transform: moved, rotated, scaled, mirrored or sheared.
 
@@ -93,10 +108,7 @@ class Instance(Shape):
         material: MaterialLike | None = None,
         name: str | None = None,
     ) -> None:
-        if not isinstance(mesh, Mesh):
-            several = isinstance(mesh, list | tuple | Shape)
-            hint = "; wf.Group(...).placed(matrices) places shapes of all kinds" if several else ""
-            raise SceneError(f"{name or 'instance'}: mesh must be a wf.Mesh, got {in_brief(mesh)}{hint}")
+        _check_mesh(name or "instance", mesh)
         self.name = mesh.name if name is None else name
         self.mesh = mesh
         self.transform = transform
@@ -127,8 +139,7 @@ class Instance(Shape):
         SceneError
             As for `Instance`. The message names the first invalid transform.
         """
-        if not isinstance(mesh, Mesh):
-            raise SceneError(f"{name or 'instance'}: mesh must be a wf.Mesh, got {in_brief(mesh)}")
+        _check_mesh(name or "instance", mesh)
         label = mesh.name if name is None else name
         motions = motions_of(transforms)
         starts: Any = transforms if motions is None else Together(motions).at_starts()
