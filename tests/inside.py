@@ -292,11 +292,13 @@ from wavefront.media.grid import survivors
 from wavefront.media.marching import March
 from wavefront.media.phase import HenyeyGreenstein, deflected
 from wavefront.media.voxels import Voxels, bounds_in_cells
+from wavefront.motion.deformation import Deformation
 from wavefront.motion.keyframes import Trs
-from wavefront.motion.product import Product
+from wavefront.motion.product import Inverse, Product
 from wavefront.motion.product import product as motion_product
 from wavefront.motion.quaternions import polar, quaternions_of, rotation_of, slerp
 from wavefront.motion.shutter import Shutter
+from wavefront.motion.steps import Motions
 from wavefront.motion.together import Together
 from wavefront.motion.track import CUBIC, LINEAR, STEP, Track
 from wavefront.motion.turn import Turn

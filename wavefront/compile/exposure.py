@@ -47,7 +47,8 @@ def exposed_scene(scene: Scene, shutter: Shutter | None) -> Exposed:
     still, moving = copy(scene), [shape for shape in scene.shapes if _moves(shape, shutter)]
     times = np.linspace(shutter.begin, shutter.end, TIMES).tolist()
     boxes = [Scene([shape.at(time) for shape in moving]).bounds for time in times if moving]
-    exposed, forms = Exposed(still, shutter, boxes=tuple(boxes)), _Forms(shutter)
+    keys = np.concatenate([_inside(each.keys, shutter) for each in (*moving, *scene.lights)])
+    exposed, forms = Exposed(still, shutter, boxes=tuple(boxes), keys=np.unique(keys)), _Forms(shutter)
     shapes = [shape.at(shutter.middle) for shape in scene.shapes]
     for number, shape in enumerate(scene.shapes):
         if _moves(shape, shutter):
@@ -194,12 +195,12 @@ class _Forms:
 
     def _keeps_shape(self, shape: Instance) -> bool:
         """Return whether the motion of an instance scales alike in all directions."""
-        times = np.linspace(self._shutter.begin, self._shutter.end, TIMES)
+        times = _moments(shape, self._shutter)
         return is_even(_matrices(shape, shape.transform)(times), EVEN)
 
     def _as_forms(self, shape: Instance) -> tuple[Mesh, Mesh]:
         """Return an instance as a mesh that deforms, and that in the middle of the time."""
-        times = np.linspace(self._shutter.begin, self._shutter.end, FORMS)
+        times = _moments(shape, self._shutter, FORMS)
         mesh = _of_forms([shape.at(time).to_mesh() for time in times.tolist()], times)
         return mesh, mesh.at(self._shutter.middle)
 
@@ -207,7 +208,7 @@ class _Forms:
         """Return whether spheres have a texture, which does not turn with them, and one size over time."""
         if shape.deformation is not None or "uv" not in attributes_read([shape]):
             return False
-        times = np.linspace(self._shutter.begin, self._shutter.end, TIMES)
+        times = _moments(shape, self._shutter)
         volumes = np.linalg.det(_matrices(shape)(times)[:, :3, :3])
         return bool(np.ptp(volumes) <= EVEN * np.abs(volumes).max())
 
@@ -230,7 +231,7 @@ class _Forms:
     def _of_carried_spheres(self, shape: Spheres, then: Any) -> Mover:
         """Return the motion of spheres that a motion carries, but does not turn."""
         matrices, places = _matrices(shape), self._uncarried(shape, then)
-        keys = np.linspace(self._shutter.begin, self._shutter.end, CARRIED + 1)
+        keys = _moments(shape, self._shutter, CARRIED + 1)
         still = matrices(np.array([self._shutter.middle]))
 
         def centers(time: float) -> Doubles:
@@ -269,14 +270,25 @@ def _keys(shape: Any, points: str, shutter: Shutter) -> Doubles:
     deformation = shape.deformation
     if isinstance(deformation, Samples):
         return deformation.times
-    steps = 1
+    steps, bends = 1, _inside(deformation.keys, shutter)
     while True:
-        times = np.linspace(shutter.begin, shutter.end, 2 * steps + 1)
-        forms = np.stack([deformation.at(time)[points] for time in times.tolist()])
+        times = np.union1d(np.linspace(shutter.begin, shutter.end, steps + 1), bends)
+        tested = np.sort(np.concatenate([times, (times[1:] + times[:-1]) / 2]))
+        forms = np.stack([deformation.at(time)[points] for time in tested.tolist()])
         off = np.abs(forms[1::2] - (forms[:-1:2] + forms[2::2]) / 2).max()
         if steps >= MOST_STEPS or off <= STRAIGHT * np.ptp(forms, axis=(0, 1)).max():
-            return times[::2]
+            return times
         steps *= 2
+
+
+def _inside(keys: Doubles, shutter: Shutter) -> Doubles:
+    """Return those of times (k,) at which a shutter is open, none twice."""
+    return np.unique(keys[(keys > shutter.begin) & (keys < shutter.end)])
+
+
+def _moments(element: Moving, shutter: Shutter, count: int = TIMES) -> Doubles:
+    """Return times while a shutter is open: evenly spaced ones, and those where an element turns."""
+    return np.union1d(np.linspace(shutter.begin, shutter.end, count), _inside(element.keys, shutter))
 
 
 def _rigid(light: Any, shutter: Shutter) -> Matrices:
@@ -287,8 +299,7 @@ def _rigid(light: Any, shutter: Shutter) -> Matrices:
     SceneError
         If they stretch it while the shutter is open.
     """
-    matrices = _matrices(light)
-    times = np.linspace(shutter.begin, shutter.end, TIMES)
+    matrices, times = _matrices(light), _moments(light, shutter)
     back = np.linalg.inv(matrices(np.array([shutter.middle]))[0])
     scales = np.linalg.svd((matrices(times) @ back)[:, :3, :3], compute_uv=False)
     if np.abs(scales - 1).max() > EVEN:

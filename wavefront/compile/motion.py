@@ -53,6 +53,8 @@ class Exposed:
     movers: dict[int, Mover] = field(default_factory=dict)  # by the number of the shape
     lights: dict[int, Matrices] = field(default_factory=dict)  # matrices, likewise
     boxes: tuple[Doubles, ...] = ()  # (2, 3) each, the corners of all that moves at some times
+    # (k,) s, times at which something may go another way
+    keys: Doubles = field(default_factory=lambda: np.zeros(0))
 
     @property
     def bounds(self) -> Doubles:
@@ -278,7 +280,8 @@ def motion_table(
         return MotionTable(shutter, None, np.full(2, -1), np.ones(2), columns.column_of_row, (), ())
     low, high = (np.stack(corners) for corners in zip(*columns.boxes, strict=True))
     reach = np.linalg.norm(np.maximum(np.abs(low), np.abs(high)), axis=1)
-    motions, mover = Motions.of(columns.matrices, shutter.begin, shutter.end, reach), np.array(columns.mover)
+    motions = Motions.of(columns.matrices, shutter.begin, shutter.end, reach, exposed.keys)
+    mover = np.array(columns.mover)
     moves = np.flatnonzero(mover >= 0)
     placements.low[:, moves], placements.high[:, moves] = _swept_boxes(motions, low, high)
     longest = np.linalg.norm(placements.to_local.T.reshape(-1, 3, 4)[:, :, :3], 2, (1, 2))
@@ -486,7 +489,8 @@ def light_motions(
         return None, {}
     shutter = exposed.shutter
     matrices = [_about(moving, shutter, center, factor) for moving in exposed.lights.values()]
-    motions = Motions.of(matrices, shutter.begin, shutter.end, np.full(len(matrices), reach))
+    reaches = np.full(len(matrices), reach)
+    motions = Motions.of(matrices, shutter.begin, shutter.end, reaches, exposed.keys)
     return motions, {number: row for row, number in enumerate(exposed.lights)}
 
 

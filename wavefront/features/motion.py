@@ -245,4 +245,4 @@ def motions_of_camera(camera: Camera, shutter: Shutter, center: Doubles, factor:
         moved[:, :3, 3] = moved[:, :3, 3] * factor + (moved[:, :3, :3] * center).sum(2) - center
         return moved
 
-    return Motions.of([matrices], shutter.begin, shutter.end, np.ones(1))
+    return Motions.of([matrices], shutter.begin, shutter.end, np.ones(1), motion.keys)

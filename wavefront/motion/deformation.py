@@ -5,6 +5,8 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from collections.abc import Mapping
 
+import numpy as np
+
 from ..arrays.vec import Doubles
 from .track import Track
 
@@ -20,6 +22,11 @@ class Deformation(ABC):
 
     start: float
     end: float
+
+    @property
+    def keys(self) -> Doubles:
+        """Seconds (k,) at which it may go another way, rising; those of its ends where it tells no others."""
+        return np.array([self.start, self.end], np.float64)
 
     @abstractmethod
     def at(self, time: float) -> Mapping[str, Doubles]:
@@ -41,6 +48,11 @@ class Samples(Deformation):
         self._tracks = {name: Track(times, values) for name, values in arrays.items()}
         self.times = times
         self.start, self.end = float(times[0]), float(times[-1])
+
+    @property
+    def keys(self) -> Doubles:
+        """The times."""
+        return self.times
 
     def at(self, time: float) -> Mapping[str, Doubles]:
         """Return the arrays at a time."""

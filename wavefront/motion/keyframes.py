@@ -61,6 +61,11 @@ class Trs(Motion):
         """Translation, rotation and scale."""
         return self.translation, self.rotation, self.scale
 
+    @property
+    def keys(self) -> Doubles:
+        """The times of all keys."""
+        return np.unique(np.concatenate([track.times for track in self.tracks]))
+
     def at_times(self, times: Doubles) -> Doubles:
         """Return the matrices (n, 4, 4) at times (n,)."""
         moments = np.asarray(times, np.float64)

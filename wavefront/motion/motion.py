@@ -41,6 +41,14 @@ class Motion(Answers, ABC):
     def at_times(self, times: Doubles) -> Doubles:
         """Return the matrices (n, 4, 4) at times (n,), for column vectors."""
 
+    @property
+    def keys(self) -> Doubles:
+        """Seconds (k,) at which it may go another way, rising; those of its ends where it tells no others.
+
+        Motion blur regards the way between them as steady.
+        """
+        return np.array([self.start, self.end], np.float64)
+
     def at(self, time: float) -> Doubles:
         """Return the matrix (4, 4) at one time.
 

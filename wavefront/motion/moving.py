@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import numpy as np
+
+from ..arrays.vec import Doubles
 from .deformation import Deformation
 from .motion import Motion
 
@@ -28,6 +31,12 @@ class Moving:
     def moves(self) -> bool:
         """Whether it moves or deforms."""
         return self.motion is not None or self.deformation is not None
+
+    @property
+    def keys(self) -> Doubles:
+        """Seconds (k,) at which it may go or deform another way; none if it is still."""
+        parts = [each.keys for each in (self.motion, self.deformation) if each is not None]
+        return np.concatenate([np.zeros(0), *parts])
 
     @property
     def time_span(self) -> tuple[float, float]:

@@ -21,8 +21,20 @@ class Product(Motion):
 
     def __init__(self, parent: Motion | Doubles, child: Motion | Doubles) -> None:
         self.parent, self.child = parent, child
-        moving = [each for each in (parent, child) if isinstance(each, Motion)]
-        self.start, self.end = min(each.start for each in moving), max(each.end for each in moving)
+        self.start, self.end = (
+            min(each.start for each in self.moving),
+            max(each.end for each in self.moving),
+        )
+
+    @property
+    def moving(self) -> list[Motion]:
+        """Those of both that move."""
+        return [each for each in (self.parent, self.child) if isinstance(each, Motion)]
+
+    @property
+    def keys(self) -> Doubles:
+        """The times of the keys of both."""
+        return np.unique(np.concatenate([each.keys for each in self.moving]))
 
     def at_times(self, times: Doubles) -> Doubles:
         """Return the matrices (n, 4, 4) at times (n,)."""
@@ -44,6 +56,11 @@ class Inverse(Motion):
 
     def __init__(self, motion: Motion) -> None:
         self._motion, self.start, self.end = motion, motion.start, motion.end
+
+    @property
+    def keys(self) -> Doubles:
+        """Those of the motion."""
+        return self._motion.keys
 
     def at_times(self, times: Doubles) -> Doubles:
         """Return the matrices (n, 4, 4) at times (n,)."""

@@ -16,6 +16,9 @@ ERROR = 2.0**-20  # of places, relative to the size of what is placed: what line
 LEAST_SCALE = 1e-9  # of what a motion flattens, relative to its greatest
 MOST_STEPS = 1 << 12
 MOST_MATRICES = 1 << 17  # of all motions; many motions have fewer steps
+# parts of a step after which it is tested: uneven, so that whole turns are not taken for rest
+PARTS = np.array([0.2113, 0.5309, 0.7927])
+NO_KEYS = np.zeros(0)
 
 
 @soa
@@ -32,7 +35,9 @@ class Motions:
     to_local: Doubles  # (12, m * (steps + 1)) the (3, 4) matrices, row by row
 
     @classmethod
-    def of(cls, motions: Sequence[Matrices], begin: float, end: float, reach: Doubles) -> Self:
+    def of(
+        cls, motions: Sequence[Matrices], begin: float, end: float, reach: Doubles, keys: Doubles = NO_KEYS
+    ) -> Self:
         """Return motions as tables of as many steps as they need.
 
         Parameters
@@ -41,19 +46,36 @@ class Motions:
             For each of m, a function from times (n,) to matrices (n, 4, 4) to the scene.
         reach
             (m,) how far from the origin of its own coordinates each reaches.
+        keys
+            (k,) times at which they may go another way, s.
         """
-        steps = 1
+        most = min(MOST_STEPS, max(MOST_MATRICES // len(motions), 1))
+        bends, steps = _bends(keys, begin, end, 4 * most), 1
         while True:
-            times = np.linspace(begin, end, 4 * steps + 1)
-            placed = np.stack([motion(times) for motion in motions])
-            placed[:, :, :3, :3] = _thickened(placed[:, :, :3, :3])
-            to_local: Doubles = np.asarray(np.linalg.inv(placed)[:, :, :3], np.float64)
-            enough = steps >= min(MOST_STEPS, MOST_MATRICES // len(motions))
-            if enough or _error_of_steps(placed[:, :, :3], to_local, reach) <= ERROR:
-                break
+            to_local = _inverse(_placed(motions, np.linspace(begin, end, steps + 1)))
+            found = cls(begin, end - begin, steps, np.ascontiguousarray(to_local.reshape(-1, 12).T))
+            if steps >= most:
+                return found
+            between = begin + (end - begin) * ((np.arange(steps)[:, None] + PARTS) / steps).ravel()
+            tests = np.concatenate([between, bends])
+            if found._error(tests, _placed(motions, tests), reach) <= ERROR:
+                return found
             steps *= 2
-        table = np.ascontiguousarray(to_local[:, ::4].reshape(-1, 12).T)
-        return cls(begin, end - begin, steps, table)
+
+    def _error(self, times: Doubles, placed: Doubles, reach: Doubles) -> float:
+        """Return the error of places at times (k,), relative to the size of what is placed.
+
+        It is of places at most `reach` (m,) from the origins of their coordinates: where the matrices take
+        them that `placed` (m, k, 4, 4) has put into the scene.
+        """
+        rows, there = np.arange(len(placed)).repeat(times.size), placed[:, :, :3]
+        back = self.at(rows, np.tile(times, len(placed))).T.reshape(there.shape)
+        turned, shifted = back[..., :3] @ there[..., :3] - np.eye(3), back[..., :3] @ there[..., 3:]
+        off = np.sqrt(((shifted[..., 0] + back[..., 3]) ** 2).sum(-1))
+        worst = (np.sqrt((turned**2).sum((-1, -2))) * reach[:, None] + off).max(1)
+        scale = np.sqrt((there[..., :3] ** 2).sum((-1, -2)) / 3).max(1)
+        size = reach + np.ptp(there[..., 3], axis=1).max(1) / scale
+        return float((worst / np.where(size > 0, size, 1)).max())
 
     def at(self, number: Ints, time: Doubles) -> Doubles:
         """Return the (3, 4) matrices of some motions (n,) at times (n,), row by row, (12, n)."""
@@ -78,6 +100,26 @@ class Motions:
         return found
 
 
+def _bends(keys: Doubles, begin: float, end: float, most: int) -> Doubles:
+    """Return keys between two times, at most so many, and the middles between them."""
+    inside = np.unique(keys[(keys > begin) & (keys < end)])
+    inside = inside[:: max(-(-inside.size // most), 1)]
+    ends = np.concatenate([[begin], inside, [end]])
+    return np.concatenate([inside, (ends[1:] + ends[:-1]) / 2])
+
+
+def _placed(motions: Sequence[Matrices], times: Doubles) -> Doubles:
+    """Return the matrices (m, k, 4, 4) of motions at times (k,), such that they can be inverted."""
+    placed = np.stack([motion(times) for motion in motions])
+    placed[:, :, :3, :3] = _thickened(placed[:, :, :3, :3])
+    return placed
+
+
+def _inverse(placed: Doubles) -> Doubles:
+    """Return the inverses (m, k, 3, 4) of affine matrices (m, k, 4, 4)."""
+    return np.asarray(np.linalg.inv(placed)[:, :, :3], np.float64)
+
+
 def _thickened(linear: Doubles) -> Doubles:
     """Return linear parts (m, k, 3, 3) that can be inverted: what is flattened stays very thin."""
     u, scales, v = np.linalg.svd(linear)
@@ -86,24 +128,6 @@ def _thickened(linear: Doubles) -> Doubles:
     found = linear.copy()
     found[flat] = (u[flat] * thin[flat][:, None]) @ v[flat]
     return found
-
-
-def _error_of_steps(placed: Doubles, to_local: Doubles, reach: Doubles) -> float:
-    """Return the error of linear steps over four of matrices (m, 4 k + 1, 3, 4), relative to what moves.
-
-    It is of places at most `reach` (m,) from the origins of their coordinates: where the matrices between,
-    `to_local`, take them that `placed` has put into the scene.
-    """
-    before, after, worst = to_local[:, :-1:4], to_local[:, 4::4], np.zeros(len(placed))
-    for part in (1, 2, 3):
-        there = placed[:, part::4]
-        back = before + (after - before) * (part / 4)
-        turned, shifted = back[..., :3] @ there[..., :3] - np.eye(3), back[..., :3] @ there[..., 3:]
-        off = np.sqrt(((shifted[..., 0] + back[..., 3]) ** 2).sum(-1))
-        worst = np.maximum(worst, (np.sqrt((turned**2).sum((-1, -2))) * reach[:, None] + off).max(1))
-    scale = np.sqrt((placed[..., :3] ** 2).sum((-1, -2)) / 3).max(1)
-    size = reach + np.ptp(placed[..., 3], axis=1).max(1) / scale
-    return float((worst / np.where(size > 0, size, 1)).max())
 
 
 def applied(matrix: Doubles, points: Floats | Doubles) -> Doubles:

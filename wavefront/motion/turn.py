@@ -28,6 +28,11 @@ class Turn(Motion):
         self._axis, self._about = axis / np.linalg.norm(axis), about
         self._turns, self.start, self.end = degrees / 360, start, end
 
+    @property
+    def keys(self) -> Doubles:
+        """Its ends, and the times of all quarters of a turn."""
+        return np.linspace(self.start, self.end, int(np.ceil(4 * abs(self._turns))) + 1)
+
     def at_times(self, times: Doubles) -> Doubles:
         """Return the matrices (n, 4, 4) at times (n,), by Rodrigues' formula."""
         part = np.clip((times - self.start) / ((self.end - self.start) or 1.0), 0, 1)

@@ -191,6 +191,11 @@ class Instance(Shape):
         return self.motion is not None or self.mesh.moves
 
     @property
+    def keys(self) -> Doubles:
+        """Seconds (k,) at which it, or its mesh, may go another way."""
+        return np.concatenate([super().keys, self.mesh.keys])
+
+    @property
     def time_span(self) -> tuple[float, float]:
         """When it begins and ends to move or its mesh to deform, seconds, as of every shape."""
         (start, end), (first, last) = super().time_span, self.mesh.time_span

@@ -87,6 +87,7 @@ class Joints:
         self.move = bool(moving)
         self.start = min((motion.start for motion in moving), default=np.inf)
         self.end = max((motion.end for motion in moving), default=-np.inf)
+        self.keys = np.concatenate([np.zeros(0), *(motion.keys for motion in moving)])
         self._last: tuple[float, dict[int, Matrix]] = np.nan, {}  # as several meshes may have one skin
 
     def at(self, time: float) -> Mapping[int, Matrix]:
@@ -122,6 +123,12 @@ class PosedMesh(FormOverTime):
         spans = [(each.start, each.end) for each in (weights,) if isinstance(each, Track)]
         spans += [(joints.start, joints.end)] if joints is not None and joints.move else []
         self.start, self.end = min(span[0] for span in spans), max(span[1] for span in spans)
+
+    @property
+    def keys(self) -> Doubles:
+        """The times of the keys of its targets and joints."""
+        targets = self._weights.times if isinstance(self._weights, Track) else np.zeros(0)
+        return np.unique(np.concatenate([targets, [] if self._joints is None else self._joints.keys]))
 
     def posed(self, time: float) -> RawMesh:
         """Return the mesh in the pose of a time."""
