@@ -18,6 +18,8 @@ MOST_STEPS = 1 << 12
 MOST_MATRICES = 1 << 17  # of all motions; many motions have fewer steps
 # parts of a step after which it is tested: uneven, so that whole turns are not taken for rest
 PARTS = np.array([0.2113, 0.5309, 0.7927])
+UNEVEN = 64  # further times at which all steps are tested, by the golden ratio
+GOLDEN = (5**0.5 - 1) / 2
 NO_KEYS = np.zeros(0)
 
 
@@ -101,11 +103,12 @@ class Motions:
 
 
 def _bends(keys: Doubles, begin: float, end: float, most: int) -> Doubles:
-    """Return keys between two times, at most so many, and the middles between them."""
+    """Return keys between two times, the middles between them, and uneven times; at most so many of each."""
     inside = np.unique(keys[(keys > begin) & (keys < end)])
     inside = inside[:: max(-(-inside.size // most), 1)]
     ends = np.concatenate([[begin], inside, [end]])
-    return np.concatenate([inside, (ends[1:] + ends[:-1]) / 2])
+    uneven = begin + (end - begin) * (np.arange(1, min(UNEVEN, most) + 1) * GOLDEN % 1)
+    return np.concatenate([inside, (ends[1:] + ends[:-1]) / 2, uneven])
 
 
 def _placed(motions: Sequence[Matrices], times: Doubles) -> Doubles:
