@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
 from importlib.util import find_spec
 from io import BytesIO
 from pathlib import Path
@@ -15,8 +15,9 @@ from .codecs.display import Display
 from .codecs.images import check_writable
 from .codecs.tone import AUTO
 from .codecs.white_balance import WhiteBalance
-from .core.errors import SaveError, SceneError, number
+from .core.errors import Interrupted, RenderError, SaveError, SceneError, number
 from .core.files import check_target, extension_of, path_name, write_bytes
+from .core.plural import plural
 from .core.suggestions import suggests_keywords
 from .image import Image
 
@@ -60,6 +61,8 @@ def save_animation(
         If there is no image, sizes differ, or an argument is out of range.
     SaveError
         If the file cannot be written.
+    Interrupted, RenderError
+        If the render of an image ends so. Those before it are saved.
 
     Examples
     --------
@@ -71,11 +74,42 @@ def save_animation(
     display = Display(gamma, exposure, tone, white_balance)
     fps = number("fps", fps, lambda x: x > 0, "above 0")
     check_animation(name)
+    until_error = _UntilError(images)
     if "{" in name:
-        return _save_numbered(name, images, display)
-    frames = _frames(name, images, display)
-    write_bytes(name, _encoded(Path(name).suffix.lower(), frames, fps))
-    return len(frames)
+        count = _save_numbered(name, until_error, display)
+    else:
+        frames = _frames(name, until_error, display)
+        write_bytes(name, _encoded(Path(name).suffix.lower(), frames, fps))
+        count = len(frames)
+    if until_error.error is not None:
+        raise _cut_short(until_error.error, name, count) from until_error.error
+    return count
+
+
+class _UntilError:
+    """Images one after the other, until the render of one fails or is stopped; the first must be there."""
+
+    def __init__(self, images: Iterable[Image]) -> None:
+        self.images = images
+        self.error: KeyboardInterrupt | RenderError | None = None
+
+    def __iter__(self) -> Iterator[Image]:
+        first = True
+        try:
+            for image in self.images:
+                first = False
+                yield image
+        except (KeyboardInterrupt, RenderError) as error:
+            if first:
+                raise
+            self.error = error
+
+
+def _cut_short(error: KeyboardInterrupt | RenderError, name: str, count: int) -> Interrupted | RenderError:
+    """Return the error of an image, which also says that those before it are saved."""
+    kind = RenderError if isinstance(error, RenderError) else Interrupted
+    text = f"{str(error) or 'interrupted'}; {name} has the {plural(count, 'picture')} before it"
+    return kind(text, getattr(error, "image", None))
 
 
 def check_animation(path: str | os.PathLike[str]) -> None:

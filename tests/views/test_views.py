@@ -138,6 +138,32 @@ def test_numbered_files(tmp_path: Path) -> None:
     assert (wf.Image.load(tmp_path / "frame_001.exr").rgb == 0.5).all()
 
 
+ENDS = [KeyboardInterrupt(), wf.Interrupted("stop", flat(0.5)), wf.RenderError("failed", flat(0.5))]
+
+
+@pytest.mark.parametrize("error", ENDS, ids=lambda error: type(error).__name__)
+@pytest.mark.parametrize("name", ["a.gif", "a{}.png"])
+def test_images_before_an_error_are_saved(name: str, error: BaseException, tmp_path: Path) -> None:
+    """So that Ctrl-C loses no more than one of many pictures; the error is of its kind still."""
+
+    def images(values):
+        yield from map(flat, values)
+        raise error
+
+    path = tmp_path / name
+    kind = wf.RenderError if isinstance(error, wf.RenderError) else wf.Interrupted
+    with pytest.raises(kind, match=r"(interrupted|stop|failed); .* has the 2 pictures before it") as caught:
+        wf.save_animation(path, images((0.25, 0.75)))
+    assert caught.value.image is getattr(error, "image", None)
+    written = sorted(tmp_path.iterdir())
+    assert [frame.shape for each in written for frame in iio.imread(each, index=...)] == [(4, 6, 3)] * 2
+    for each in written:
+        each.unlink()
+    with pytest.raises(type(error)):
+        wf.save_animation(path, images(()))
+    assert not list(tmp_path.iterdir())
+
+
 def test_the_command_writes_an_animation(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     mesh = tmp_path / "mesh.obj"
     mesh.write_text("v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 3 2\nf 1 2 4\nf 2 3 4\nf 1 4 3\n")
