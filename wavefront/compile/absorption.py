@@ -7,6 +7,7 @@ are in. That is so for a glass ball, a prism or a bottle by itself. The conditio
 - It is closed, with two faces at each edge, and its front is outside. Connected parts do not overlap.
 - It does not emit.
 - Its bounding box contains no part of another shape, and no light that has a position.
+- No shape and no light moves while a shutter is open (compile/scene.py).
 
 Cameras and sensors may be inside, since every ray that they trace leaves through the surface. A shape that
 lies on a flat side counts as inside, because rays hit both at one distance; one that only touches the box

@@ -25,6 +25,7 @@ from ..motion.shutter import Shutter
 from ..motion.steps import Matrices, Motions, step_at
 from ..scene import Scene
 from ..shapes import Instance, Mesh
+from ..shapes.attributes import Corners, corner_values
 from .geometry import compute_corner_normals, compute_face_normals
 
 BOX_ROOM = 2.0**-17  # margin of boxes of moving shapes, relative to their size
@@ -70,7 +71,8 @@ class DeformingRows:
     first: int  # row of its first triangle in the scene's tables
     times: Doubles  # (steps + 1,) s
     corners: list[Floats]  # for each of those times (m, 3, 3)
-    normals: list[tuple[Floats, Floats, Floats]] | None  # of vertices, 3 × (3, m); None where they have none
+    normals: list[Corners] | None  # of vertices, 3 × (3, m); None where they have none
+    vectors: dict[str, list[Corners]]  # attributes that are vectors along the surface, likewise
 
     @property
     def end(self) -> int:
@@ -89,29 +91,39 @@ class DeformingRows:
 
     def face_normals(self, row: Ints, time: Doubles) -> Floats:
         """Return the unit normals (3, n) of triangles, by their rows (n,), at times (n,)."""
+        return compute_face_normals(self.corners_at(row, time))
+
+    def corners_at(self, row: Ints, time: Doubles) -> Doubles:
+        """Return the corners (n, 3, 3) of triangles, by their rows (n,), at times (n,)."""
         step, fraction = step_at(self.times, time)
-        normals = np.empty((3, row.size), f4)
+        corners = np.empty((row.size, 3, 3))
         for number in range(len(self.corners) - 1):
             lanes = np.flatnonzero(step == number)
             at = row.take(lanes) - self.first
             before, after = (self.corners[number + side].take(at, 0).astype(np.float64) for side in (0, 1))
-            normals[:, lanes] = compute_face_normals(
-                before + (after - before) * fraction.take(lanes)[:, None, None]
-            )
-        return normals
+            corners[lanes] = before + (after - before) * fraction.take(lanes)[:, None, None]
+        return corners
 
     def vertex_normals(self, row: Ints, time: Doubles) -> list[Floats]:
         """Return the normals of vertices, 3 × (3, n), of triangles at times; not of unit length."""
         assert self.normals is not None
+        return self._between(self.normals, row, time)
+
+    def vectors_at(self, name: str, row: Ints, time: Doubles) -> list[Floats]:
+        """Return vectors along the surface at the corners, 3 × (c, n), of triangles at times."""
+        return self._between(self.vectors[name], row, time)
+
+    def _between(self, forms: list[Corners], row: Ints, time: Doubles) -> list[Floats]:
+        """Return values at corners, 3 × (c, n), at times (n,), given those at the times of forms."""
         step, fraction = step_at(self.times, time)
-        normals = [np.empty((3, row.size), f4) for _ in range(3)]
-        for number in range(len(self.normals) - 1):
+        found = [np.empty((len(values), row.size), f4) for values in forms[0]]
+        for number in range(len(forms) - 1):
             lanes = np.flatnonzero(step == number)
             at, share = row.take(lanes) - self.first, fraction.take(lanes).astype(f4)
-            for corner, values in enumerate(normals):
-                before, after = (self.normals[number + side][corner].take(at, 1) for side in (0, 1))
+            for corner, values in enumerate(found):
+                before, after = (forms[number + side][corner].take(at, 1) for side in (0, 1))
                 values[:, lanes] = before + (after - before) * share
-        return normals
+        return found
 
 
 @soa
@@ -169,7 +181,13 @@ class MotionTable:
 
 
 def deforming_rows(
-    mesh: Mesh, still: Mesh, keys: Doubles, first: int, shutter: Shutter, drift: Doubles
+    mesh: Mesh,
+    still: Mesh,
+    keys: Doubles,
+    first: int,
+    shutter: Shutter,
+    drift: Doubles,
+    vectors: Sequence[str] = (),
 ) -> DeformingRows:
     """Return the triangles of a mesh that deforms while a shutter is open.
 
@@ -183,6 +201,8 @@ def deforming_rows(
         Row of its first triangle in the scene's tables.
     drift
         (3,) way of the middle of its vertices over the whole time, which is taken off.
+    vectors
+        Attributes along the surface that materials read.
     """
     times = _steps_of(mesh, keys, shutter)
     middle = still.bounds.mean(0)
@@ -199,7 +219,8 @@ def deforming_rows(
             compute_corner_normals([form], face) or (face,) * 3
             for form, face in zip(meshes, flat, strict=True)
         ]
-    return DeformingRows(first, times, corners, normals)
+    along = {name: [corner_values(name, [form]) for form in meshes] for name in vectors}
+    return DeformingRows(first, times, corners, normals, along)
 
 
 def _times_of(keys: Doubles, shutter: Shutter) -> Doubles:
@@ -240,6 +261,7 @@ def motion_table(
     placements: Placements | None,
     first_row: int,
     rows_in_all: int,
+    vectors: Sequence[str] = (),
 ) -> MotionTable:
     """Return where instances are at a time, and give `placements` boxes that hold all of these places.
 
@@ -260,9 +282,11 @@ def motion_table(
     first_row, rows_in_all
         Row of the first triangle of `shared` in the scene's tables, and their number of rows. The rows of
         `kinds` are the last ones.
+    vectors
+        Attributes along surfaces that materials read.
     """
     assert exposed.shutter is not None
-    columns = _MotionColumns(np.zeros(rows_in_all, np.intp))
+    columns = _MotionColumns(np.zeros(rows_in_all, np.intp), vectors)
     shutter, k = exposed.shutter, numbers.size - len(instances)
     row_of = _first_rows(shared, first_row)
     for instance, number in zip(instances, numbers[k:].tolist(), strict=True):
@@ -299,8 +323,8 @@ def motion_table(
 class _MotionColumns:
     """The columns of a `MotionTable` while it is built, in the order of the instances."""
 
-    def __init__(self, column_of_row: Ints) -> None:
-        self.column_of_row, self.mover = column_of_row, list[int]()
+    def __init__(self, column_of_row: Ints, vectors: Sequence[str]) -> None:
+        self.column_of_row, self.mover, self.vectors = column_of_row, list[int](), vectors
         self.matrices, self.boxes = list[Matrices](), list[tuple[Doubles, Doubles]]()
         self.deforming, self.curved = dict[int, DeformingRows](), list[CurvedRows]()
 
@@ -324,7 +348,9 @@ class _MotionColumns:
             whole = moving.mesh if factor == unit else moving.mesh.lengths_times(factor / unit)
             drift = _drift(whole, shutter)
             if id(mesh) not in self.deforming:
-                self.deforming[id(mesh)] = deforming_rows(whole, mesh, moving.keys, row, shutter, drift)
+                self.deforming[id(mesh)] = deforming_rows(
+                    whole, mesh, moving.keys, row, shutter, drift, self.vectors
+                )
             box = self.deforming[id(mesh)].box
         traced = _traced(moving.matrices, mesh.bounds.mean(0), drift, shutter, center, factor, unit)
         self._add(traced, box, row, len(mesh.faces))

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from copy import copy
 from dataclasses import field, replace
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -18,7 +19,7 @@ from ..lights import LightTable
 from ..lights.choice import LightSamplerMaker
 from ..scene import Scene
 from ..shapes import Shape
-from ..shapes.attributes import Corners, corner_values
+from ..shapes.attributes import ATTRIBUTES, Corners, corner_values
 from .absorption import absorbs_alone
 from .curved import CurvedTable
 from .exposure import exposed_scene
@@ -176,7 +177,9 @@ def gather_scene(
     triangles, normals = gather_triangles(meshes, vertices)
     user_materials, material_of, replaced = number_materials(meshes, curved, instances)
     around = None if scene.medium is None else scene.medium.scaled(scale)
-    filled = media_of(user_materials, around, lambda: absorbs_alone(placed, scene.lights, scale))
+    # what moves may be elsewhere at another time, so a table of media tells where it is
+    alone = (lambda: False) if exposed.shutter else partial(absorbs_alone, placed, scene.lights, scale)
+    filled = media_of(user_materials, around, alone)
     media = media_table(around, placed, user_materials, filled, center)
     glowing, of_media = glow_lights(media)
     phases = phase_materials(filled)
@@ -202,6 +205,7 @@ def gather_scene(
             placements,
             once,
             len(material_of),
+            [name for name in attributes_read(placed) if ATTRIBUTES[name].vectors],
         )
     if media is not None and placements is not None and motion is not None:
         media.bounds = with_places(media.bounds, placements)
@@ -245,7 +249,7 @@ def gather_scene(
     if caustics and len(lights) > int(environment >= 0):  # one is not at infinity
         whole = np.append(np.arange(once), np.arange(len(triangles), len(material_of)))
         specular = find_specular_surfaces(
-            triangles[:once], table_of_curved, material_of.take(whole), light_of.take(whole), groups_of
+            triangles[:once], table_of_curved, still, material_of.take(whole), light_of.take(whole), groups_of
         )
     groups, efficacies = numbered.groups(), numbered.efficacies()
     if media is not None:

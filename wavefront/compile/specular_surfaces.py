@@ -67,12 +67,18 @@ class SpecularSurfaces:
 
 
 def find_specular_surfaces(
-    triangles: Floats, curved: CurvedTable, material_of: Ints, light_of: Ints, materials: MaterialTable
+    triangles: Floats,
+    curved: CurvedTable,
+    still: int,
+    material_of: Ints,
+    light_of: Ints,
+    materials: MaterialTable,
 ) -> SpecularSurfaces | None:
     """Return the specular surfaces of a scene; None if it has none.
 
-    Cylinders, capsules and instances that share their arrays do not count, nor do spheres that shine: no
-    light sample tells whether a point on such a sphere is lit from the other side of the same sphere.
+    Cylinders, capsules and instances that share their arrays do not count, nor does what moves while a
+    shutter is open, nor do spheres that shine: no light sample tells whether a point on such a sphere is
+    lit from the other side of the same sphere.
 
     Parameters
     ----------
@@ -80,19 +86,21 @@ def find_specular_surfaces(
         (m, 3, 3) those that no instance shares.
     curved
         The k curved primitives, whose ids follow those of the triangles.
+    still
+        How many of their kinds, the first ones, do not move.
     material_of, light_of
         (m + k,) material of each of these primitives, and its light, -1 for none.
     """
     delta = np.array([bsdf.specular for bsdf in materials.groups], np.bool_)[materials.group_of]
     of_prim = np.append(delta.take(material_of), False)
-    of_prim[len(triangles) : -1] &= _spheres_among(curved) & (light_of[len(triangles) :] < 0)
+    of_prim[len(triangles) : -1] &= _spheres_among(curved, still) & (light_of[len(triangles) :] < 0)
     flat = np.flatnonzero(of_prim[: len(triangles)])
     corners = triangles.take(flat, 0)
     edge, other = (corners[:, k].astype(np.float64) - corners[:, 0] for k in (1, 2))
     area = np.linalg.norm(np.cross(edge, other), axis=1) / 2
     ball = np.flatnonzero(of_prim[len(triangles) :])
     centers, radii = np.zeros((3, 0), f4), np.zeros(0, f4)
-    for kind, first in zip(curved.kinds, curved.first, strict=True):
+    for kind, first in zip(curved.kinds[:still], curved.first, strict=False):
         if isinstance(kind, SpherePrimitives) and ball.size:
             centers, radii = kind.centers.take(ball - first, 1), kind.radii.take(ball - first)
     cumulative = np.cumsum(np.append(area, 4 * np.pi * radii.astype(np.float64) ** 2))
@@ -104,9 +112,12 @@ def find_specular_surfaces(
     return SpecularSurfaces(of_prim, found_as, prim, corners, centers, radii, cumulative)
 
 
-def _spheres_among(curved: CurvedTable) -> Bools:
-    """Return whether each curved primitive is a sphere, (k,)."""
+def _spheres_among(curved: CurvedTable, still: int) -> Bools:
+    """Return whether each curved primitive is a sphere, and among the kinds that do not move, (k,)."""
     return np.concatenate(
         [np.zeros(0, np.bool_)]
-        + [np.full(len(kind), isinstance(kind, SpherePrimitives)) for kind in curved.kinds]
+        + [
+            np.full(len(kind), isinstance(kind, SpherePrimitives) and number < still)
+            for number, kind in enumerate(curved.kinds)
+        ]
     )

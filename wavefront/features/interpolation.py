@@ -49,9 +49,7 @@ class SmoothSurfaces(Surfaces):
         ns = self._interpolated(ng)
         curved = np.flatnonzero(hits.prim >= scene.triangles)
         if scene.curved.shading_normals and curved.size:
-            prim = hits.prim.take(curved) - scene.triangles
-            at = self.own_points(point).take(curved, 1)
-            ns[:, curved] = scene.curved.shading(prim, at, ng.take(curved, 1))
+            ns[:, curved] = self.curved_normals(curved, point, ng)
         return face_viewer(-self.rays.direction, ns * side)
 
     def _interpolated(self, ng: Floats) -> Floats:

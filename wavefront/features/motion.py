@@ -15,7 +15,7 @@ from ..camera.poses import upright
 from ..compile.program import Facts, Feature
 from ..compile.scene import CompiledScene
 from ..motion.shutter import Shutter
-from ..motion.steps import Motions, applied, inverse_linear, moved_back, transposed_turned
+from ..motion.steps import Motions, applied, inverse_linear, moved_back, transposed_times, transposed_turned
 from ..sampling.tiles import Tiles
 from ..stages.interaction import Surfaces
 from ..stages.intersect import ShadowRays
@@ -37,6 +37,18 @@ class DeformingSurfaces(Surfaces):
                 prim.take(lanes), times_of(self.scene, self.rays).take(lanes)
             )
         return ng, error
+
+    def corner_values(self, name: str, corners: list[Floats]) -> list[Floats]:
+        """Return an attribute at corners; vectors along what deforms are those at the times of the rays."""
+        table, prim = self.scene.motion, self.hits.prim
+        assert table is not None
+        for deforming, lanes in table.deformation_of(prim):
+            if name in deforming.vectors:
+                time = times_of(self.scene, self.rays).take(lanes)
+                then = deforming.vectors_at(name, prim.take(lanes), time)
+                for values, of_corner in zip(corners, then, strict=True):
+                    values[:, lanes] = of_corner
+        return super().corner_values(name, corners)
 
     def corner_normals(self, corners: list[Floats]) -> list[Floats]:
         """Return normals of vertices, those of meshes that deform at the times of the rays."""
@@ -113,6 +125,17 @@ class MovingSurfaces(Surfaces):
         ng, error = super().normals(point, error)
         point[:, at] = moved_back(matrix, point.take(at, 1) + ways)
         return ng, error
+
+    def curved_normals(self, lanes: Ints, point: Floats, ng: Floats) -> Floats:
+        """Return shading normals (3, k); curved shapes have them where they are in the scene's tables."""
+        moves = self._curved()
+        if not moves.size:
+            return super().curved_normals(lanes, point, ng)
+        at, matrix, own = self._moves.take(moves), self._matrix.take(moves, 1), ng.copy()
+        own[:, at] = normalize(transposed_times(inverse_linear(matrix), ng.take(at, 1)))
+        found, place = super().curved_normals(lanes, point, own), np.searchsorted(lanes, at)
+        found[:, place] = normalize(transposed_turned(matrix, found.take(place, 1)))
+        return found
 
     def own_points(self, point: Floats) -> Floats:
         """Return points (3, n), those of curved shapes where these are in the scene's tables."""

@@ -15,12 +15,13 @@ from typing import Self
 import numpy as np
 
 from ..arrays.soa import soa
-from ..arrays.state import SurfaceInteraction
-from ..arrays.vec import Bools, Floats, Ints, Lanes, dot, f4, take
+from ..arrays.state import Hits, SurfaceInteraction
+from ..arrays.vec import Bools, Floats, Ints, Lanes, dot, f4, normalize, take
 from ..compile.program import Facts, Feature
 from ..compile.scene import CompiledScene
 from ..stages.interaction import Surfaces, at_corners
 from ..stages.shade import Shading
+from .motion import times_of
 
 # of normals at vertices with that of the triangle: those of a box lean by 55°, and a round surface for them
 # would bulge through shapes beside it
@@ -55,15 +56,35 @@ class RoundSurfaces(Surfaces):
         assert met.b2 is not None
         weights = (f4(1) - met.b1 - met.b2, met.b1, met.b2)
         side = np.where(surface.back_facing.take(lanes), f4(-1), f4(1))
-        k = feature.heights.take(met.prim, 1)
-        assert scene.corner_normals is not None
+        k, normals = self._heights(feature, lanes, met)
         total = np.zeros((3, lanes.size), f4)
-        for corner, normal in enumerate(at_corners(scene.corner_normals, met, scene.triangles)):
+        for corner, normal in enumerate(normals):
             one, other = (weights[vertex] for vertex in range(3) if vertex != corner)
             below = side * (one * k[2 * corner] + other * k[2 * corner + 1])  # of the plane at the vertex
             total += normal * (weights[corner] * side * np.maximum(-below, f4(0)))
         lift[:, lanes] = total
         return self.vectors(lift)
+
+    def _heights(self, feature: ShadowTerminator, lanes: Ints, met: Hits) -> tuple[Floats, list[Floats]]:
+        """Return the heights (6, k) and the normals at corners, 3 × (3, k), of hits on lanes (k,).
+
+        Those of meshes that deform are of the times of the rays.
+        """
+        scene = self.scene
+        assert scene.corner_normals is not None
+        heights, normals = (
+            feature.heights.take(met.prim, 1),
+            at_corners(scene.corner_normals, met, scene.triangles),
+        )
+        for deforming, at in () if scene.motion is None else scene.motion.deformation_of(met.prim):
+            if deforming.normals is not None:
+                row, time = met.prim.take(at), times_of(scene, self.rays).take(lanes.take(at))
+                then = [normalize(normal) for normal in deforming.vertex_normals(row, time)]
+                corners = deforming.corners_at(row, time).astype(f4)
+                heights[:, at] = heights_of(corners, tuple(then), deforming.face_normals(row, time))
+                for values, normal in zip(normals, then, strict=True):
+                    values[:, at] = normal
+        return heights, normals
 
 
 class RoundShading(Shading):
@@ -130,7 +151,9 @@ class ShadowTerminator(Feature):
             return None
         heights = heights_of(facts.corners, corners, facts.compiled.normals)
         transmissive = np.array([material.bsdf.transmissive for material in facts.materials], np.bool_)
-        curved = np.asarray(heights.any(0))
+        curved, motion = np.asarray(heights.any(0)), facts.compiled.motion
+        for deforming in () if motion is None else motion.deformations:
+            curved[deforming.first : deforming.end] |= deforming.normals is not None
         return cls(heights, curved, transmissive) if curved.any() and not transmissive.all() else None
 
 

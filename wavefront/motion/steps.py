@@ -154,6 +154,12 @@ def transposed_turned(matrix: Doubles, vectors: Floats | Doubles) -> Doubles:
     return np.stack([m[i] * x + m[i + 4] * y + m[i + 8] * z for i in (0, 1, 2)])
 
 
+def transposed_times(linear: Doubles, vectors: Floats | Doubles) -> Doubles:
+    """Return vectors (3, n), each by a transposed (3, 3) matrix, given row by row, (9, n)."""
+    x, y, z = vectors
+    return np.stack([linear[i] * x + linear[i + 3] * y + linear[i + 6] * z for i in (0, 1, 2)])
+
+
 def moved_back(matrix: Doubles, points: Floats | Doubles) -> Doubles:
     """Return points (3, n), each by the inverse of a (3, 4) matrix, given row by row, (12, n)."""
     away, inverse = points - matrix[3::4], inverse_linear(matrix)

@@ -71,7 +71,7 @@ class Surfaces:
         rows = self.material_rows(scene, hits, ALL)
         surface = SurfaceInteraction(point, error, front, ns, wo, self.prims(), rows, back_facing)
         for name, corners in scene.attributes.items():
-            values = _attribute(scene, name, corners, hits, self.own_points(point))
+            values = self.attribute(name, corners, self.own_points(point))
             setattr(surface, name, self.vectors(values) if ATTRIBUTES[name].vectors else values)
         return surface
 
@@ -96,9 +96,47 @@ class Surfaces:
         """
         return front
 
+    def attribute(self, name: str, table: Corners, point: Floats) -> Floats:
+        """Return an attribute, (c, n): interpolated on triangles, computed on curved primitives.
+
+        Parameters
+        ----------
+        table
+            Its values at the corners of all triangles.
+        point
+            (3, n) in the coordinates of curved primitives in the scene's tables.
+        """
+        scene, hits = self.scene, self.hits
+        if scene.triangles:
+            values = interpolated(self.corner_values(name, at_corners(table, hits, scene.triangles)), hits)
+        else:
+            values = np.empty((len(table[0]), len(hits.prim)), f4)
+        round_ = np.flatnonzero(hits.prim >= scene.triangles)
+        if round_.size:
+            prim = hits.prim.take(round_) - scene.triangles
+            values[:, round_] = ATTRIBUTES[name].on_curved(scene.curved, prim, point.take(round_, 1))
+        return values
+
+    def corner_values(self, name: str, corners: list[Floats]) -> list[Floats]:
+        """Return the values of an attribute at the corners of triangles, 3 × (c, n)."""
+        return corners
+
     def corner_normals(self, corners: list[Floats]) -> list[Floats]:
         """Return normals of vertices, 3 × (3, n), in the coordinates of the scene."""
         return corners
+
+    def curved_normals(self, lanes: Ints, point: Floats, ng: Floats) -> Floats:
+        """Return the shading normals (3, k) of lanes (k,) on curved primitives.
+
+        Parameters
+        ----------
+        lanes
+            Rising.
+        point, ng
+            (3, n) points of all lanes, and normals of the surface.
+        """
+        prim = self.hits.prim.take(lanes) - self.scene.triangles
+        return self.scene.curved.shading(prim, self.own_points(point).take(lanes, 1), ng.take(lanes, 1))
 
     def own_points(self, point: Floats) -> Floats:
         """Return points (3, n) in the coordinates in which curved primitives are in the scene's tables."""
@@ -177,19 +215,6 @@ def face_viewer(wo: Floats, ns: Floats) -> Floats:
         ns[:, away] = normalize(ns.take(away, 1) + wo.take(away, 1) * (MIN_COS - cos.take(away)))
         ns[:, away] = normalize(ns.take(away, 1) + wo.take(away, 1) * MIN_COS)
     return ns
-
-
-def _attribute(scene: CompiledScene, name: str, corners: Corners, hits: Hits, point: Floats) -> Floats:
-    """Return an attribute at hits, (c, n): interpolated on triangles, computed on curved primitives."""
-    if scene.triangles:
-        values = interpolated(at_corners(corners, hits, scene.triangles), hits)
-    else:
-        values = np.empty((len(corners[0]), len(hits.prim)), f4)
-    round_ = np.flatnonzero(hits.prim >= scene.triangles)
-    if round_.size:
-        prim = hits.prim.take(round_) - scene.triangles
-        values[:, round_] = ATTRIBUTES[name].on_curved(scene.curved, prim, point.take(round_, 1))
-    return values
 
 
 def at_corners(table: Corners, hits: Hits, triangles: int) -> list[Floats]:
