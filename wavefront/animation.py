@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from importlib.util import find_spec
 from io import BytesIO
 from pathlib import Path
+from typing import BinaryIO, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,6 +22,7 @@ from .core.plural import plural
 from .core.suggestions import suggests_keywords
 from .image import Image
 
+Codes: TypeAlias = NDArray[np.uint8]  # (H, W, 3)
 ANIMATIONS = (".gif", ".png", ".mp4")
 
 
@@ -78,9 +80,8 @@ def save_animation(
     if "{" in name:
         count = _save_numbered(name, until_error, display)
     else:
-        frames = _frames(name, until_error, display)
-        write_bytes(name, _encoded(Path(name).suffix.lower(), frames, fps))
-        count = len(frames)
+        encode = _mp4 if Path(name).suffix.lower() == ".mp4" else _pictures
+        count = _save_one(name, encode, _frames(name, until_error, display), fps)
     if until_error.error is not None:
         raise _cut_short(until_error.error, name, count) from until_error.error
     return count
@@ -161,29 +162,51 @@ def _save_numbered(pattern: str, images: Iterable[Image], display: Display) -> i
     return count
 
 
-def _frames(name: str, images: Iterable[Image], display: Display) -> list[NDArray[np.uint8]]:
-    """Return the codes (H, W, 3) of all images; a transparent background becomes black."""
-    frames: list[NDArray[np.uint8]] = []
+def _frames(name: str, images: Iterable[Image], display: Display) -> Iterator[Codes]:
+    """Yield the codes (H, W, 3) of all images; a transparent background becomes black."""
+    size = None
     for image in images:
         codes = image.to_uint8(display.gamma, display.exposure, display.tone, display.white_balance)
-        if frames and codes.shape[:2] != frames[0].shape[:2]:
-            sizes = " and ".join(f"{c.shape[1]}x{c.shape[0]}" for c in (frames[0], codes))
+        height, width = codes.shape[:2]
+        if size not in (None, (width, height)):
+            sizes = "{}x{} and ".format(*size) + f"{width}x{height}"
             raise SceneError(f"{name}: images of an animation must have one size, got {sizes}")
-        frames.append(codes[..., :3])
-    if not frames:
+        size = width, height
+        yield codes[..., :3]
+
+
+Encode: TypeAlias = Callable[[BinaryIO, str, Iterator[Codes], float], int]  # the number of frames
+
+
+def _save_one(name: str, encode: Encode, frames: Iterator[Codes], fps: float) -> int:
+    """Write frames as one file, and return their number."""
+    buffer = BytesIO()
+    count = encode(buffer, Path(name).suffix.lower(), frames, fps)
+    if not count:
         raise SceneError(f"{name}: there are no images to save")
-    return frames
+    write_bytes(name, buffer.getvalue())
+    return count
 
 
-def _encoded(extension: str, frames: list[NDArray[np.uint8]], fps: float) -> bytes:
+def _mp4(file: BinaryIO, extension: str, frames: Iterator[Codes], fps: float) -> int:
+    """Write a video frame by frame: in memory there is one at a time."""
     import imageio.v3 as iio
 
-    buffer = BytesIO()
-    stack = np.stack(frames)
-    if extension == ".mp4":
-        height, width = stack.shape[1:3]
-        even = stack[:, : height // 2 * 2, : width // 2 * 2]  # the codec halves the resolution of color
-        iio.imwrite(buffer, even, extension=".mp4", plugin="pyav", codec="libx264", fps=fps)
-    else:
-        iio.imwrite(buffer, stack, extension=extension, plugin="pillow", duration=1000 / fps, loop=0)
-    return buffer.getvalue()
+    count = 0
+    with iio.imopen(file, "w", extension=extension, plugin="pyav") as video:
+        for count, codes in enumerate(frames, 1):
+            if count == 1:
+                video.init_video_stream("libx264", fps=fps)
+            height, width = codes.shape[:2]
+            video.write_frame(codes[: height // 2 * 2, : width // 2 * 2])  # the codec halves colors
+    return count
+
+
+def _pictures(file: BinaryIO, extension: str, frames: Iterator[Codes], fps: float) -> int:
+    """Write an animated picture; it is encoded when all frames are there."""
+    import imageio.v3 as iio
+
+    codes = list(frames)
+    if codes:
+        iio.imwrite(file, codes, extension=extension, plugin="pillow", duration=1000 / fps, loop=0)
+    return len(codes)
