@@ -9,6 +9,7 @@ from __future__ import annotations
 
 COLORS = ("reflectance", "base_color", "intensity", "irradiance", "radiance", "colors")
 _LOOK_AT = ("wf.Camera.look_at(origin, target, up, fov=..., size=...)",)
+_FISHEYE = ("camera.replace(projection=wf.Fisheye(180))",)
 _FLUX = ("lumens", "wf.with_flux(light, lumens=...) or watts=...")
 _ENVIRONMENT = ("Environment", 'wf.Environment("sky.hdr") beside the shapes, as in wf.render([shape, light])')
 _SHOW = ("wf.view(scene) for a window, or wf.render(scene).show()",)
@@ -168,6 +169,11 @@ SYNONYMS: dict[str, tuple[str, ...]] = {
     **{f"camera().{name}": _LOOK_AT for name in ("position", "location", "eye", "target", "lookat", "up")},
     "camera().fov": _LOOK_AT,
     "camera.perspective": ("wf.Camera.look_at(origin, target, fov=...)",),
+    **{f"camera.{name}": _FISHEYE for name in ("equidistant", "equisolid", "fisheye.fov", "fisheye.angle")},
+    **{f"camera.{name}.projection": ("camera.replace(projection=...)",) for name in ("lookat", "framing")},
+    "camera.equirectangular": ("panorama",),
+    "camera.spherical": ("panorama",),
+    "camera.pinhole": ("wf.Camera.look_at(origin, target, fov=...)",),
     "camera.copy": ("camera.replace(...)",),
     "camera.frame": ("wf.Camera.framing(scene)",),
     "camera.fit": ("wf.Camera.framing(scene)",),
