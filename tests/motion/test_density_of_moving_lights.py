@@ -61,6 +61,16 @@ LIGHTS = {
     ),
     "several": None,
 }
+PIXELS = np.random.default_rng(2).random((6, 12, 3)) ** 4
+SKIES = {
+    "image": [wf.Environment(PIXELS, transform=TURN)],
+    "sky": [wf.Sky.cie(12, (1, 1, 0.5), horizontal=1, direct_normal=2).transformed(TURN)],
+    "sun": [wf.DirectionalLight((0.2, -1, 0.3), 2, angle=20).transformed(TURN)],
+    "skies": [
+        wf.Environment(PIXELS, transform=TURN, rows="poles", filter="nearest"),
+        wf.Sky.cie(5, (1, 1, 0.5), horizontal=1, direct_normal=0.5),
+    ],
+}
 SEVERAL = ("triangles", "sphere", "instance", "deforming")
 PLACES = (
     ((0, 0, 0), (0, 1, 0)),
@@ -72,8 +82,11 @@ PLACES = (
 def compiled(name):
     """The scene of a light while the shutter is open from 0 to 1 s."""
     floor = wf.Rectangle((-5, -1, 5), (10, 0, 0), (0, 0, -10))
-    shapes = [LIGHTS[name]] if name != "several" else [LIGHTS[each] for each in SEVERAL]
-    scene = wf.Scene([floor, *shapes])
+    if name in SKIES:
+        scene = wf.Scene([floor, LIGHTS["rectangle"]], SKIES[name])
+    else:
+        shapes = [LIGHTS[name]] if name != "several" else [LIGHTS[each] for each in SEVERAL]
+        scene = wf.Scene([floor, *shapes])
     make = lambda geometry: make_accelerator(geometry, "numpy")  # noqa: E731
     return compile_scene(scene, make, asked={"shutter": Shutter(0, 1)})
 
@@ -113,7 +126,7 @@ def test_samples_at_a_time_have_the_density_of_that_time(name):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("name", LIGHTS)
+@pytest.mark.parametrize("name", [*LIGHTS, *SKIES])
 def test_samples_have_the_densities_of_their_times(name):
     scene = compiled(name)
     for (where, normal), time in zip(PLACES, (0.0, 0.37, 1.0), strict=True):

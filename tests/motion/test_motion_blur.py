@@ -81,6 +81,16 @@ def lights():
     return [wf.PointLight((1, 4, 2), 60), wf.Environment(0.3)]
 
 
+def turning_skies():
+    """An image, a sky with its sun, and a disk of light; the disk is still."""
+    pixels = np.random.default_rng(3).random((8, 16, 3)) ** 3
+    return [
+        wf.Environment(pixels, transform=TURN, backdrop=pixels[::-1]),
+        wf.Sky.cie(12, (1, 1, 0.5), horizontal=1, direct_normal=0.5).transformed(TURN),
+        wf.DirectionalLight((0.4, -1, 0.3), 1, angle=25),
+    ]
+
+
 def scenes():
     """Scenes in which something moves from 0 to 1 s, by name."""
     box = wf.Box((0, 0, 0), 0.8, material=wf.Diffuse((0.3, 0.7, 0.2)))
@@ -112,6 +122,7 @@ def scenes():
             view(),
         ),
         "camera": wf.Scene([floor(), box, ball.translated((1, 0, 0))], lights(), moving),
+        "sky": wf.Scene([floor(), box], turning_skies(), view()),
     }
 
 
@@ -450,12 +461,16 @@ def crossed():
         "camera": wf.Scene([floor(), lamp, wf.Box((0, 0, 0), 0.8)], [], SCENES["camera"].camera),
         "deforming": wf.Scene([floor(), lamp, wf.Mesh(vertices, faces, times=[0, 0.3, 1])], [], view()),
         "lamp": wf.Scene([floor(), lamp.transformed(TURN), wf.Box((0, 0, 0), 0.8)], [], view()),
+        "sky": wf.Scene([floor(), wf.Box((0, 0, 0), 0.8)], turning_skies(), view()),
     }
     ball = wf.Sphere((-0.9, 0.1, 1), 0.5, material=wf.Dielectric(1.5))
+    cloud = wf.Sphere((-0.9, 0.1, 1), 0.5, material=filled(wf.NullSurface(), scattering=2))
     found = {}
     for name, scene in moving.items():
         fog = wf.Scene(scene.shapes, [], scene.camera, medium=wf.Medium(scattering=0.1))
-        found[f"{name}, glass"] = wf.Scene([*scene.shapes, ball], [], scene.camera), {}
+        if scene.lights:  # at infinity, which no fog around all lets through
+            fog = wf.Scene([*scene.shapes, cloud], scene.lights, scene.camera)
+        found[f"{name}, glass"] = wf.Scene([*scene.shapes, ball], scene.lights, scene.camera), {}
         found[f"{name}, fog"] = fog, {}
         found[f"{name}, guide"] = scene, {"guide": True}
         found[f"{name}, branches"] = scene, {"branches": 4}

@@ -145,14 +145,3 @@ def test_an_environment_that_would_be_stretched_is_refused():
     stretched = wf.Keyframes([0, 1], [np.eye(4), np.diag([2, 1, 1, 1])])
     with pytest.raises(wf.SceneError, match="Environment transform must be a rotation"):
         wf.Environment(PIXELS, transform=stretched)
-
-
-def test_an_environment_that_turns_while_the_shutter_is_open_is_as_in_the_middle():
-    scene = wf.Scene([wf.Sphere((0, 0, 0), 1)], DOMES["image"](SPIN))
-    with pytest.warns(UserWarning, match="Environment turns while the shutter is open.*as in the middle"):
-        blurred = wf.render(scene, 2, size=(12, 8), shutter=(0.2, 0.6), denoise=False)
-    still = wf.render(scene.at(0.4), 64, size=(12, 8), denoise=False)
-    np.testing.assert_allclose(blurred.rgb.mean(), still.rgb.mean(), rtol=0.1)
-    closed = wf.render(scene.at(0.2), 64, size=(12, 8), denoise=False)
-    sky = blurred.rgb[0], still.rgb[0], closed.rgb[0]  # the uppermost row, which nothing hides
-    assert np.abs(sky[0] - sky[1]).mean() < np.abs(sky[2] - sky[1]).mean() / 2

@@ -43,6 +43,8 @@ VIEW = wf.Camera.look_at((0, 2, 6), (0, 0, 0), fov=40, size=(16, 12))
 MOVING_VIEW = VIEW.transformed(way(0.3, -0.1, -0.2, degrees=3))
 LAMP = wf.PointLight((-1.5, 2, 1.5), 20)
 PANEL = wf.Rectangle((-0.4, 1.2, -0.4), (0.8, 0, 0), (0, 0, 0.8), emission=8)
+DOME = wf.Environment(np.random.default_rng(1).random((4, 8, 3)) ** 3, backdrop=(0.1, 0.2, 0.3))
+CLEAR = wf.Sky.cie(12, (1, 1, 0.5), horizontal=1, direct_normal=0.5)
 GOES = way(1, 0.2, 0.5, degrees=70)
 
 
@@ -56,9 +58,10 @@ def scenes() -> dict[str, wf.Scene]:
         "light": wf.Scene([FLOOR, BOX], [LAMP.transformed(GOES)], VIEW),
         "panel": wf.Scene([FLOOR, BOX, PANEL.transformed(GOES)], [], VIEW),
         "rows": wf.Scene([FLOOR, BOX.transformed(GOES)], [LAMP], VIEW.replace(rolling_shutter=0.3)),
+        "sky": wf.Scene([FLOOR, BOX], [DOME.transformed(GOES), CLEAR.transformed(GOES)], VIEW),
         "all": wf.Scene(
             [FLOOR, BOX.transformed(GOES), MELTS.translated((-1, 0, 0)), PANEL.transformed(GOES)],
-            [LAMP.transformed(way(0, 1, 0)), wf.Environment(0.2)],
+            [LAMP.transformed(way(0, 1, 0)), DOME.transformed(GOES)],
             MOVING_VIEW.replace(rolling_shutter=0.1),
         ),
     }

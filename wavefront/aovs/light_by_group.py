@@ -48,7 +48,8 @@ class LightByGroup:
         mixed = np.flatnonzero(group < 0)
         if mixed.size:
             assert toward is not None
-            for name, share in groups.parts_of_environment(take(toward, mixed)):
+            time = None if paths.time is None else paths.time.take(contribution.lanes.take(mixed))
+            for name, share in groups.parts_of_environment(take(toward, mixed), time):
                 light = self.light[groups.names.index(name)]
                 add_to_slots(light, slot.take(mixed), take(arriving, mixed) * share)
 

@@ -6,7 +6,7 @@ import numpy as np
 
 from ..arrays.elementary import sin_cos_turns
 from ..arrays.vec import Doubles, Floats, f4
-from ..lights import InfiniteLight, LightRecord
+from ..lights import EnvironmentSum, InfiniteLight, LightRecord
 from ..lights.base import emitters_of, sampled_li
 from ..lights.glow import GlowLights
 from ..textures.base import BaseTexture
@@ -28,6 +28,8 @@ def brightest_emitter(scene: CompiledScene) -> Doubles:
 
 def _brightest(kind: LightRecord) -> Doubles:
     """Return the greatest radiance of lights of one kind, (3,)."""
+    if isinstance(kind, EnvironmentSum) and kind.turns:  # as if the brightest of all met
+        return np.sum([_brightest(light) for light in kind.parts], axis=0)
     if isinstance(kind, InfiniteLight):
         toward = np.concatenate([kind.sample_li(_origins(SIDE**2), _strata()).wi, _around()], 1)
         return _most(kind.le(toward))

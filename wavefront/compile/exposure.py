@@ -11,6 +11,7 @@ import numpy as np
 
 from ..arrays.vec import Doubles
 from ..core.errors import SceneError, warn_caller
+from ..lights import Environment
 from ..motion import Keyframes, Moving, Samples
 from ..motion.quaternions import rotation_of
 from ..motion.shutter import Shutter
@@ -92,6 +93,10 @@ def _light_over_time(lights: list[Any], times: Doubles) -> Any:
     if all(light is middle for light in lights) or {type(light) for light in lights} != {type(middle)}:
         return middle
     ways = np.tile(np.eye(4), (len(times), 1, 1))
+    if isinstance(middle, Environment):
+        rotations = np.stack([light.rotation for light in lights])
+        if (rotations != middle.rotation).any():
+            ways[:, :3, :3] = rotations @ middle.rotation.T
     if hasattr(middle, "direction"):
         ways[:, :3, :3] = _turns(np.stack([light.direction for light in lights]))
     if hasattr(middle, "position"):
@@ -141,7 +146,9 @@ def _of_forms(meshes: Sequence[Any], times: Doubles) -> Mesh:
 
 
 def _moves(element: Moving, shutter: Shutter) -> bool:
-    """Return whether an element of a scene moves while a shutter is open."""
+    """Return whether an element of a scene moves while a shutter is open, so that it is seen."""
+    if isinstance(element, Environment) and element.is_even:
+        return False
     start, end = element.time_span
     return element.moves and start < shutter.end and end > shutter.begin
 

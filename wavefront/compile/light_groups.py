@@ -9,7 +9,7 @@ from typing import Generic, NamedTuple, TypeVar
 import numpy as np
 
 from ..arrays.soa import soa
-from ..arrays.vec import Floats, Ints
+from ..arrays.vec import Doubles, Floats, Ints
 from ..colors import EFFICACY
 from ..core.errors import number
 from ..film.aov_names import DEFAULT_GROUP, group_name
@@ -50,9 +50,12 @@ class LightGroups(Generic[K]):
         names = self.names if name in self.names else (*self.names, name)
         return replace(self, names=names, of_light=np.append(self.of_light, names.index(name)))
 
-    def parts_of_environment(self, wi: Floats) -> Iterator[tuple[K, Floats]]:
-        """Yield each group of the environment, and its part (3, n) of the radiance from wi (3, n)."""
-        radiances = [light.le(wi) for _, light in self.environment]
+    def parts_of_environment(self, wi: Floats, time: Doubles | None) -> Iterator[tuple[K, Floats]]:
+        """Yield each group of the environment, and its part (3, n) of the radiance from wi (3, n).
+
+        `time` (n,) is when the light comes; None where nothing moves.
+        """
+        radiances = [light.le_at(wi, time) for _, light in self.environment]
         total = np.zeros_like(wi)
         for radiance in radiances:
             total += radiance

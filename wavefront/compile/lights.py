@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from typing import Any, TypeAlias
 
 import numpy as np
@@ -30,7 +30,6 @@ from ..lights import (
 from ..lights.choice import LightSamplerMaker
 from ..lights.textured_emission import has_textured_emission, mean_radiance
 from ..lights.textured_sphere import mean_sphere_radiance
-from ..motion.steps import Motions
 from ..scene import Scene
 from ..shapes import CurvedShape, Mesh, Shape, Sphere, Spheres
 from ..shapes.attributes import ATTRIBUTES
@@ -43,12 +42,17 @@ from .moving_lights import moving_light, moving_parts
 Emitter: TypeAlias = tuple[LightRecord, Ints | None]
 
 
-def find_backdrop(scene: Scene, scale: float, center: Doubles) -> InfiniteLight | None:
+def find_backdrop(
+    scene: Scene, scale: float, center: Doubles, motion: MotionTable | None
+) -> InfiniteLight | None:
     """Return the light at infinity that the camera sees; None if it is the one that lights the scene."""
     shown = [light.backdrop or light if isinstance(light, Environment) else light for light in scene.lights]
     if shown == list(scene.lights):
         return None
-    records = [_checked_record(light, scale, center) for light in shown]
+    records = [
+        moving_light(light, _checked_record(light, scale, center), number, motion)
+        for number, light in enumerate(shown)
+    ]
     return EnvironmentSum.of([record for record in records if isinstance(record, InfiniteLight)])
 
 
@@ -65,7 +69,6 @@ def gather_lights(
     mis: bool,
     glowing: Sequence[LightRecord] = (),
     motion: MotionTable | None = None,
-    light_motions: tuple[Motions | None, Mapping[int, int]] = (None, {}),
 ) -> tuple[LightTable, GroupNumbers, Ints, int]:
     """Return the lights, their groups, and the light of each primitive and of rays that miss.
 
@@ -84,9 +87,7 @@ def gather_lights(
     glowing
         The lights of media; they are the last ones before those at infinity, in the default group.
     motion
-        The shapes that move while a shutter is open.
-    light_motions
-        How lights move, and which does how, by their numbers.
+        The shapes and lights that move while a shutter is open.
 
     Raises
     ------
@@ -110,9 +111,7 @@ def gather_lights(
     infinite: list[InfiniteLight] = []
     surfaces: list[tuple[Emitter, int]] = []
     for number, light in enumerate(scene.lights):
-        record = _checked_record(light, scale, center)
-        if number in light_motions[1]:
-            record = moving_light(light, record, light_motions[0], light_motions[1][number])
+        record = moving_light(light, _checked_record(light, scale, center), number, motion)
         if isinstance(record, InfiniteLight):
             infinite.append(record.compensated() if mis else record)
             groups.add_to_environment(light, infinite[-1])

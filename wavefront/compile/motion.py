@@ -21,6 +21,7 @@ from ..accel.sphere import SpherePrimitives
 from ..arrays.soa import soa
 from ..arrays.state import Hits
 from ..arrays.vec import Bools, Doubles, Floats, Ints, f4
+from ..lights.base import FarLight
 from ..motion.shutter import Shutter
 from ..motion.steps import Matrices, Motions, step_at
 from ..scene import Scene
@@ -162,6 +163,8 @@ class MotionTable:
     column_of_row: Ints  # (rows,) column of the `InstanceTable` of moving shapes, by table row; else 0
     deformations: tuple[DeformingRows, ...]
     curved: tuple[CurvedRows, ...]
+    lights: Motions | None = None  # of those in `motion_of_light`
+    motion_of_light: dict[int, int] = field(default_factory=dict)  # by their numbers in the scene
 
     def is_rigid(self, row: Ints) -> Bools:
         """Return which rows (n,) of the scene's tables are of no mesh that deforms."""
@@ -503,6 +506,8 @@ def light_motions(
     exposed: Exposed, center: Doubles, factor: float, reach: float
 ) -> tuple[Motions | None, dict[int, int]]:
     """Return the motions of lights from their places in the middle of the time, and their rows by number.
+
+    Those that are infinitely far away only turn.
 
     Parameters
     ----------

@@ -3,33 +3,39 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import replace
 
 import numpy as np
 
 from ..arrays.vec import Floats, Ints
-from ..core.errors import SceneError, warn_caller
-from ..lights import InfiniteLight, Light, LightRecord
+from ..core.errors import SceneError
+from ..lights import ConstantEnvironment, ImageEnvironment, InfiniteLight, Light, LightRecord
 from ..lights.moving import DeformingLights, MovingLights
-from ..motion.steps import Motions
+from ..lights.turning import TurningLight
 from .motion import DeformingRows, MotionTable
 
 
-def moving_light(light: Light, record: LightRecord, motions: Motions | None, number: int) -> LightRecord:
-    """Return a light, given by its record in the middle of the time, as it moves.
-
-    Those that fill a part of the sky stay as they are then, and a warning says so.
+def moving_light(light: Light, record: LightRecord, number: int, motion: MotionTable | None) -> LightRecord:
+    """Return a light of a scene, given by its record in the middle of the time, as it moves.
 
     Raises
     ------
     SceneError
         If it is one of a surface.
     """
+    if motion is None or number not in motion.motion_of_light:
+        return record
     if light.shape is not None:
         raise SceneError(f"{type(light).__name__} moves while the shutter is open; move its shape instead")
-    if isinstance(record, InfiniteLight) or motions is None:
-        warn_caller(f"{type(light).__name__} turns while the shutter is open; it is shown as in the middle")
+    row, motions = motion.motion_of_light[number], motion.lights
+    assert motions is not None
+    if not isinstance(record, InfiniteLight):
+        return MovingLights(record, np.full(len(record), row), motions, type(record))
+    if isinstance(record, ConstantEnvironment):  # the same however it is turned
         return record
-    return MovingLights(record, np.full(len(record), number), motions, type(record))
+    if isinstance(record, ImageEnvironment) and record.in_texels:
+        record = replace(record, in_texels=False, made=None)  # rays that escape see the image, not means
+    return TurningLight(record, row, motions)
 
 
 def moving_parts(

@@ -207,6 +207,8 @@ def gather_scene(
             len(material_of),
             [name for name in attributes_read(placed) if ATTRIBUTES[name].vectors],
         )
+        radius = float(np.linalg.norm(high - low)) / 2
+        motion.lights, motion.motion_of_light = light_motions(exposed, center, scale, radius)
     if media is not None and placements is not None and motion is not None:
         media.bounds = with_places(media.bounds, placements)
     lights, numbered, light_of, environment = gather_lights(
@@ -222,7 +224,6 @@ def gather_scene(
         mis,
         glowing,
         motion,
-        light_motions(exposed, center, scale, float(np.linalg.norm(high - low)) / 2),
     )
     if media is not None and glowing:
         media.light_of[of_media] = (

@@ -24,7 +24,8 @@ class Backdrop(Feature):
     @classmethod
     def of(cls, facts: Facts) -> Self | None:
         """Return the backdrop of the lights at infinity; None with a background, which hides it."""
-        shown = find_backdrop(facts.scene, facts.compiled.scale, facts.compiled.center)
+        compiled = facts.compiled
+        shown = find_backdrop(facts.scene, compiled.scale, compiled.center, compiled.motion)
         return None if shown is None or facts.asked.get("background") is not None else cls(shown)
 
     def meet(self, leg: Leg) -> None:
@@ -32,7 +33,10 @@ class Backdrop(Feature):
         lanes = leg.emission.lanes
         missed = np.flatnonzero(take(leg.hits.prim, lanes) < 0)
         radiance = np.array(leg.emission.radiance)
-        radiance[:, missed] = self.shown.le(take(leg.paths.direction, lanes.take(missed)))
+        at, time = lanes.take(missed), leg.paths.time
+        radiance[:, missed] = self.shown.le_at(
+            take(leg.paths.direction, at), None if time is None else time.take(at)
+        )
         leg.emission = replace(leg.emission, radiance=radiance)
 
 

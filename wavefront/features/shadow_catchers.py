@@ -128,6 +128,6 @@ def _candidates(
         wi = frame.to_world(local)
         pdf = scene.lights.pdf_li(numbers, start, wi, receiver)
         weight = power_heuristic(local[2] * INV_PI, pdf)
-        radiance = scene.lights.le(numbers, wi)
+        radiance = scene.lights.le(numbers, wi, time=surface.time)
         far = LightSample(wi, radiance, local[2] * INV_PI, np.full(n, np.inf, f4), np.ones(n, f4))
         yield far, numbers, luminance(radiance) * f4(np.pi) * weight

@@ -167,6 +167,16 @@ class Environment(Parametrized, FarLight):
         else:
             self._radiance, self._image = rgb("Environment radiance", radiance) * self._scale, None
 
+    @property
+    def rotation(self) -> Doubles:
+        """(3, 3) rotation from the environment's space to world space; of one that turns, at its start."""
+        return np.eye(3) if self._transform is None else self._transform
+
+    @property
+    def is_even(self) -> bool:
+        """Whether light and backdrop are each the same from everywhere, so that no turn of them is seen."""
+        return self._image is None and (self.backdrop is None or self.backdrop.is_even)
+
     def sample_in_texels(self) -> None:
         """Let light samples take means over texels of the image, which must vary slowly (octahedral.py)."""
         assert self._image is not None

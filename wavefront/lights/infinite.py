@@ -25,6 +25,7 @@ class InfiniteLight(FarLight, LightRecord):
     """
 
     __slots__ = ()
+    turns: ClassVar[bool] = False  # whether `le_at` depends on the time
 
     def record(self, center: Doubles) -> Self:
         """Return the light: it is the same from everywhere."""
@@ -52,6 +53,10 @@ class InfiniteLight(FarLight, LightRecord):
         """
         return self
 
+    def le_at(self, wi: Floats, time: Doubles | None) -> Floats:
+        """Return the radiance (3, n) in directions wi (3, n) at times (n,), s; here that of all times."""
+        return self.le(wi)
+
 
 @soa
 class EnvironmentSum(InfiniteLight):
@@ -65,6 +70,11 @@ class EnvironmentSum(InfiniteLight):
     choice: Discrete
     receiver: Receiver | None = None  # the surfaces for which the parts are sampled
     takes_receiver: ClassVar[bool] = True
+
+    @property
+    def turns(self) -> bool:  # type: ignore[override]
+        """Whether one of the parts does."""
+        return any(light.turns for light in self.parts)
 
     @classmethod
     def of(cls, parts: Sequence[InfiniteLight]) -> InfiniteLight:
@@ -88,7 +98,8 @@ class EnvironmentSum(InfiniteLight):
             if lanes.size:
                 lit = lit_for(light, self.receiver, lanes)
                 wi[:, lanes] = lit.sample_li(point.take(lanes, 1), stretched.take(lanes, 1)).wi
-        return at_infinity(wi, self.le(wi), self.pdf_li(point, wi))
+        time = None if self.receiver is None else self.receiver.time
+        return at_infinity(wi, self.le_at(wi, time), self.pdf_li(point, wi))
 
     def pdf_li(self, point: Floats, wi: Floats) -> Floats:
         """Return the sum of the parts' densities, each times the chance of the part."""
@@ -104,9 +115,13 @@ class EnvironmentSum(InfiniteLight):
 
     def le(self, wi: Floats, surface: SurfaceInteraction | None = None) -> Floats:
         """Return the sum of the parts' radiances, (3, n)."""
+        return self.le_at(wi, None)
+
+    def le_at(self, wi: Floats, time: Doubles | None) -> Floats:
+        """Return the sum of the parts' radiances, (3, n), at times (n,)."""
         radiance = np.zeros_like(wi)
         for light in self.parts:
-            radiance += light.le(wi)
+            radiance += light.le_at(wi, time)
         return radiance
 
     def power(self, scene_radius: float) -> Doubles:

@@ -12,6 +12,7 @@ from ..arrays.vec import ALL, Doubles, Floats, Ints, Lanes, f4, put, take
 from ..sampling.mis import power_heuristic
 from .base import Emitters, LightRecord, LightSample, Receiver, emitters_of, lit_for, sampled_li
 from .choice import LightSampler, LightSamplerMaker
+from .infinite import InfiniteLight
 from .octahedral import OctahedralEnvironment
 from .samplers import LIGHT_SAMPLERS, SingleLightSampler, SubsetLightSampler
 
@@ -66,6 +67,7 @@ class LightTable:
         self.reads = {name for kind in kinds for name in kind.reads}  # attributes of surfaces, for `le`
         last = self.kinds[-1] if self.kinds else None  # lights at infinity come last
         self.texels = last if isinstance(last, OctahedralEnvironment) else None
+        self.turning = last if isinstance(last, InfiniteLight) and last.turns else None
         self.takes_receiver = any(kind.takes_receiver for kind in kinds)
         self.delta_of = np.array([kind.delta for kind in kinds], np.bool_)[self.kind_of]
         extent = np.broadcast_to(np.asarray(half_size, float), 3)
@@ -146,14 +148,23 @@ class LightTable:
         wi: Floats,
         surface_at: Callable[[Ints], SurfaceInteraction] | None = None,
         pdf: Floats | None = None,
+        time: Doubles | None = None,
     ) -> Floats:
         """Return the radiance (3, n) of the lights numbered `light` (n,) against wi (3, n).
 
         `surface_at` is called with the lanes (k,) whose lights vary, if there are any, and returns the
         surfaces there. `pdf` (n,) is the density of rays that light samples could replace, inf of others.
+        `time` (n,) is that of the rays, for lights at infinity that turn.
         """
-        if pdf is not None and self.texels is not None:
-            return self._le_of_texels(light, wi, surface_at, pdf)
+        texels, turning = self.texels, self.turning
+        if pdf is not None and texels is not None:
+            return self._le_by_rays(
+                light, wi, surface_at, lambda far: texels.le_of_texels(take(wi, far), take(pdf, far))
+            )
+        if time is not None and turning is not None:
+            return self._le_by_rays(
+                light, wi, surface_at, lambda far: turning.le_at(take(wi, far), take(time, far))
+            )
         if self.varies is None:
             return self._le(light, wi, None)
         varies = self.varies.take(light)
@@ -167,21 +178,20 @@ class LightTable:
             put(radiance, lanes, self._le(light.take(lanes), take(wi, lanes), surface_at(lanes)))
         return radiance
 
-    def _le_of_texels(
+    def _le_by_rays(
         self,
         light: Ints,
         wi: Floats,
         surface_at: Callable[[Ints], SurfaceInteraction] | None,
-        pdf: Floats,
+        far_light: Callable[[Lanes], Floats],
     ) -> Floats:
-        """Return the same where the last light is known by its texels."""
-        assert self.texels is not None
+        """Return the same, where that of the last light, on some lanes, depends on more of the rays."""
         if len(self) == 1:
-            return self.texels.le_of_texels(wi, pdf)
+            return far_light(ALL)
         far = light == len(self) - 1
         lanes, others = np.flatnonzero(far), np.flatnonzero(~far)
         radiance = np.empty_like(wi)
-        put(radiance, lanes, self.texels.le_of_texels(take(wi, lanes), pdf.take(lanes)))
+        put(radiance, lanes, far_light(lanes))
         radiance_others = self.le(
             light.take(others), take(wi, others), surface_at and (lambda at: surface_at(others.take(at)))
         )

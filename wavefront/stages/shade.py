@@ -190,7 +190,8 @@ def emitted(scene: CompiledScene, paths: Paths, hits: Hits) -> Contribution:
     pdf = None
     if scene.lights.texels is not None:
         pdf = np.where(take(paths.specular, lanes), f4(np.inf), take(paths.pdf, lanes))
-    radiance = scene.lights.le(light, paths.direction.take(lanes, 1), surface_at, pdf)
+    time = None if paths.time is None else paths.time.take(lanes)
+    radiance = scene.lights.le(light, paths.direction.take(lanes, 1), surface_at, pdf, time)
     return Contribution(lanes, radiance, light)
 
 
