@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from inside import write_image
 
 import wavefront as wf
 
@@ -99,3 +100,15 @@ def test_motion_of_what_cannot_move_is_left_out(tmp_path: Path) -> None:
     with pytest.warns(UserWarning, match="its motion left out"):
         scene = load(tmp_path, f'{sky}<shape type="cube"/>', strict=False)
     assert scene.duration == 0
+
+
+def test_environment_maps_turn_while_the_shutter_is_open(tmp_path: Path) -> None:
+    write_image(tmp_path / "sky.exr", np.random.default_rng(1).random((6, 12, 3)).astype(np.float32))
+    image = '<string name="filename" value="sky.exr"/>'
+    scene = load(tmp_path, f'<shape type="sphere"/><emitter type="envmap">{image}{SLIDE}</emitter>')
+    scene.camera = wf.Camera.look_at((0, 0, 9), (0, 0, 10), fov=90, size=(4, 4))
+    steps = list(wf.trace(scene, shutter=(1, 3)))
+    paths = next(step.paths for step in steps if step.stage == "generate")
+    for lane in range(16):
+        due = scene.at(paths.time[lane]).lights[0].record(np.zeros(3)).le(paths.direction[:, [lane]])[:, 0]
+        np.testing.assert_allclose(steps[-1].light[:, paths.slot[lane]], due, rtol=1e-4)

@@ -270,6 +270,18 @@ def test_cameras_lights_and_instances_move(tmp_path: Path) -> None:
     np.testing.assert_allclose(at(scene.at(1).shapes[1]), [-3, 1, 3], atol=1e-12)
 
 
+def test_infinite_lights_turn_while_the_shutter_is_open(tmp_path: Path) -> None:
+    write_image(tmp_path / "e.exr", np.random.default_rng(1).random((8, 8, 3)).astype(np.float32))
+    turn = "Rotate 20 1 0 0 ActiveTransform EndTime Rotate 70 0 1 2"
+    scene = load(tmp_path, f'{turn} LightSource "infinite" "string filename" "e.exr" Identity {POINT}')
+    scene.camera = wf.Camera.look_at((0, 0, -9), (0, 0, -10), fov=90, size=(4, 4))
+    steps = list(wf.trace(scene, shutter=(0.2, 0.9)))
+    paths = next(step.paths for step in steps if step.stage == "generate")
+    for lane in range(16):
+        due = scene.at(paths.time[lane]).lights[0].record(np.zeros(3)).le(paths.direction[:, [lane]])[:, 0]
+        np.testing.assert_allclose(steps[-1].light[:, paths.slot[lane]], due, rtol=1e-4)
+
+
 @pytest.mark.parametrize(
     ("body", "message"),
     [

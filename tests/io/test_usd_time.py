@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from inside import Shutter, exposed_scene
+from inside import Shutter, exposed_scene, write_image
 
 import wavefront as wf
 
@@ -178,6 +178,37 @@ def test_a_lamp_that_spins_is_on_its_way_at_all_times(tmp_path: Path) -> None:
     wanted = [scene.at(time).lights[0].direction for time in times.tolist()]
     np.testing.assert_allclose(axes, wanted, atol=1e-6)
     assert wanted[0] @ wanted[16] == pytest.approx(-1)
+
+
+DOME = """def DomeLight "dome"
+{
+    asset inputs:texture:file = @sky.exr@
+    double xformOp:rotateX.timeSamples = { 10: 20, 30: 380 }
+    double3 xformOp:translate.timeSamples = { 10: (0, 0, 0), 30: (9, 0, 0) }
+    uniform token[] xformOpOrder = ["xformOp:translate", "xformOp:rotateX"]
+}
+"""
+
+
+def test_a_dome_that_spins_is_seen_as_at_each_time(tmp_path: Path) -> None:
+    write_image(tmp_path / "sky.exr", np.random.default_rng(1).random((6, 12, 3)).astype(np.float32))
+    scene = wf.load(stage(tmp_path, STILL + DOME))
+    scene.camera = wf.Camera.look_at((0, 0, -9), (0, 0, -10), fov=90, size=(8, 8))
+    steps = list(wf.trace(scene, shutter=(1.2, 2.8)))
+    seen, paths = steps[-1].light, next(step.paths for step in steps if step.stage == "generate")
+    for lane in range(0, 64, 9):
+        (sky,) = scene.at(paths.time[lane]).lights
+        due = sky.record(np.zeros(3)).le(paths.direction[:, [lane]])[:, 0]
+        np.testing.assert_allclose(seen[:, paths.slot[lane]], due, rtol=1e-4)
+
+
+def test_a_dome_that_stands_still_is_no_light_that_turns(tmp_path: Path) -> None:
+    write_image(tmp_path / "sky.exr", np.ones((6, 12, 3), np.float32) + np.eye(6, 12)[:, :, None])
+    still = DOME.replace(".timeSamples = { 10: 20, 30: 380 }", " = 20")
+    still = still.replace(".timeSamples = { 10: (0, 0, 0), 30: (9, 0, 0) }", " = (0, 0, 0)")
+    exposed = exposed_scene(wf.load(stage(tmp_path, BENT + still)), Shutter(1, 3))
+    assert exposed.movers
+    assert not exposed.lights
 
 
 def test_a_moment_is_what_is_read_at_its_time(tmp_path: Path) -> None:

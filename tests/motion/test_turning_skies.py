@@ -12,6 +12,7 @@ import wavefront as wf
 PIXELS = np.random.default_rng(3).random((8, 16, 3)) ** 3
 SPIN = wf.Keyframes([0, 1], [placed((0, 0, 0), 10), placed((90, 2, 3), 130)])  # its ways have no effect
 TIP = wf.Keyframes([0, 1], [np.eye(4), placed(degrees=50, axis=0)])
+TURNED = wf.Keyframes([0, 0.5, 1], [placed(degrees=-each, axis=2) for each in (0, 90, 180)])
 CLEAR = wf.Sky.cie(12, (1, 1, 0.5), horizontal=1)
 SUN = wf.DirectionalLight((0.4, -1, 0.3), 1.5, angle=25)
 SHOWN = {
@@ -25,7 +26,7 @@ SHOWN = {
 def compiled(shapes, lights):
     """A scene while the shutter is open from 0 to 1 s."""
     make = lambda geometry: make_accelerator(geometry, "numpy")  # noqa: E731
-    return compile_scene(wf.Scene(shapes, lights), make, asked=ASKED)
+    return compile_scene(wf.Scene(shapes, lights), make, asked=ASKED, mis=True)
 
 
 def radiance_from(light, direction):
@@ -51,10 +52,11 @@ def test_each_ray_sees_the_sky_of_its_time(name):
     np.testing.assert_allclose(steps[-1].light, due, rtol=1e-4, atol=1e-4)
 
 
-@pytest.mark.parametrize("name", ["image", "sky", "sum"])
+@pytest.mark.parametrize("name", ["image", "in texels", "sky", "sum"])
 def test_samples_have_the_density_of_their_time(name):
     """Chi-square over parts of the sphere, in which the density is integrated by evenly spread directions."""
-    lights, count, at = compiled([PLANE], SHOWN[name]).lights, 1 << 15, (0.0, 0.7)
+    shown = [in_texels()] if name == "in texels" else SHOWN[name]
+    lights, count, at = compiled([PLANE], shown).lights, 1 << 15, (0.0, 0.7)
     number = np.arange(1 << 17) + 0.5
     y, turns = 1 - 2 * number / number.size, number * (5**0.5 - 1) / 2
     level = np.sqrt(1 - y * y)
@@ -70,6 +72,16 @@ def test_samples_have_the_density_of_their_time(name):
         assert due.sum() == pytest.approx(1, abs=3e-3)
         found = np.bincount(part_of(drawn.wi), minlength=64)
         assert stats.chisquare(found[due > 0], count * due[due > 0] / due.sum()).pvalue > 1e-4
+        seen = lights.turning.le_at(drawn.wi, np.full(count, time))
+        differs = np.abs(seen - drawn.radiance).max(0) > 1e-3 * seen.max(0)
+        assert differs.mean() < 1e-3  # at edges of pixels
+
+
+def in_texels():
+    """An image that a light that is still would be sampled from by means over texels."""
+    light = wf.Environment(np.kron(PIXELS, np.ones((4, 4, 1))))
+    light.sample_in_texels()
+    return light.transformed(SPIN)
 
 
 def facing(n, time):
@@ -83,9 +95,24 @@ def part_of(wi):
     return 8 * row + np.minimum((np.arctan2(wi[0], wi[2]) / np.pi + 1) * 4, 7).astype(np.intp)
 
 
+def test_samples_are_drawn_for_the_side_that_a_surface_faces_then():
+    lights = compiled([PLANE], [wf.Environment(PIXELS, transform=TURNED)]).lights
+    for time in (0.0, 0.5, 1.0):
+        u = np.random.default_rng(3).random((3, 4096), np.float32)
+        drawn, _ = lights.sample_li(np.zeros((3, 4096), np.float32), u[0], u[1:], facing(4096, time))
+        assert (drawn.wi[1] > 0).mean() > 0.8
+
+
+def test_a_small_sun_is_on_its_way_however_far_its_motion_carries_it():
+    keys = wf.Keyframes([0, 1], [np.eye(4), placed((1e6, 0, -1e5), 150, axis=0)])
+    sun = wf.DirectionalLight((0.1, -1, 0.2), 1, angle=0.05).transformed(keys)
+    times = np.linspace(0, 1, 57)
+    toward = np.stack([-sun.at(time).direction for time in times.tolist()], 1).astype(np.float32)
+    assert (compiled([PLANE], [sun]).lights.turning.le_at(toward, times) > 0).all()
+
+
 # --- A sky of which one half is bright, above a plane --------------------------------------------------
 
-TURNED = wf.Keyframes([0, 0.5, 1], [placed(degrees=-each, axis=2) for each in (0, 90, 180)])
 HALF = np.ones((2, 4, 3)) * np.array([1.0, 1, 0, 0])[:, None]  # bright towards +x
 PLANE = wf.Rectangle((-1, 0, 1), (2, 0, 0), (0, 0, -2), material=wf.Diffuse(0.5))
 ABOVE = wf.Camera.orthographic((0, 1, 0), (0, 0, 0), up=(0, 0, 1), height=0.5, size=8)
@@ -145,6 +172,7 @@ def test_even_light_pays_nothing_for_a_turn():
     np.testing.assert_array_equal(pictures[0], pictures[2])
     np.testing.assert_array_equal(pictures[1], pictures[2])
     assert compiled(turning.shapes, turning.lights).motion is None
+    assert compiled([PLANE], SHOWN["backdrop"]).lights.turning is None
 
 
 def test_brightest_is_what_meets_at_some_time():

@@ -21,7 +21,6 @@ from ..accel.sphere import SpherePrimitives
 from ..arrays.soa import soa
 from ..arrays.state import Hits
 from ..arrays.vec import Bools, Doubles, Floats, Ints, f4
-from ..lights.base import FarLight
 from ..motion.shutter import Shutter
 from ..motion.steps import Matrices, Motions, step_at
 from ..scene import Scene
@@ -506,8 +505,6 @@ def light_motions(
     exposed: Exposed, center: Doubles, factor: float, reach: float
 ) -> tuple[Motions | None, dict[int, int]]:
     """Return the motions of lights from their places in the middle of the time, and their rows by number.
-
-    Those that are infinitely far away only turn.
 
     Parameters
     ----------

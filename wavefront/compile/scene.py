@@ -207,8 +207,8 @@ def gather_scene(
             len(material_of),
             [name for name in attributes_read(placed) if ATTRIBUTES[name].vectors],
         )
-        radius = float(np.linalg.norm(high - low)) / 2
-        motion.lights, motion.motion_of_light = light_motions(exposed, center, scale, radius)
+        reach = float(np.linalg.norm(high - low)) / 2
+        motion.lights, motion.motion_of_light = light_motions(exposed, center, scale, reach)
     if media is not None and placements is not None and motion is not None:
         media.bounds = with_places(media.bounds, placements)
     lights, numbered, light_of, environment = gather_lights(
