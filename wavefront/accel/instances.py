@@ -9,13 +9,14 @@ distance in the scene.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
+from itertools import islice
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ..arrays.soa import soa
-from ..arrays.vec import Bools, Doubles, Floats, Ints, f4, spans
+from ..arrays.vec import ALL, Bools, Doubles, Floats, Ints, Lanes, f4, spans, take
 from .base import Accelerator, Intersections
 from .build import build_tree
 
@@ -54,6 +55,7 @@ class InstanceAccelerator:
         self.name = single.name
         self._single, self._meshes, self.placements = single, meshes, placements
         self._first = int(placements.first[0])
+        self._count = np.diff(placements.first, append=np.iinfo(np.intp).max)  # (k,) primitive ids of each
         tree = build_tree(placements.low, placements.high, 1, WIDTH)
         self._width = int(np.flatnonzero(tree.child.any(0)).max(initial=0)) + 1  # few instances need less
         self._low, self._high = (
@@ -65,11 +67,10 @@ class InstanceAccelerator:
     def closest(self, origin: Floats, direction: Floats, exclude_prim: Ints) -> Intersections:
         """Return the nearest hits of rays (3, n) with t > 0; at equal t the lowest primitive id."""
         hits = self._single.closest(origin, direction, self._exclude_single(exclude_prim))
-        excluded = self._exclude_instanced(exclude_prim)
         for lane, instance in self._rounds(origin, direction, hits.t):
             for number, at in self._by_mesh(instance):
-                lanes, instances = lane.take(at), instance.take(at)
-                rays = self._local(origin, direction, excluded, lanes, instances)
+                lanes, instances = take(lane, at), take(instance, at)
+                rays = self._local(origin, direction, exclude_prim, lanes, instances)
                 mesh_hits = self._mesh(number, lanes).closest(*rays)
                 mesh_hits.prim += np.where(mesh_hits.prim >= 0, self.placements.first.take(instances), 0)
                 _update_closest(hits, lanes, mesh_hits)
@@ -78,13 +79,12 @@ class InstanceAccelerator:
     def occluded(self, origin: Floats, direction: Floats, distance: Floats, exclude_prim: Ints) -> Bools:
         """Return a mask (n,): which rays hit anything at 0 < t < `distance` (n,)."""
         blocked = self._single.occluded(origin, direction, distance, self._exclude_single(exclude_prim))
-        excluded = self._exclude_instanced(exclude_prim)
         t_far = np.where(blocked, f4(-1), distance)
         for lane, instance in self._rounds(origin, direction, t_far):
             for number, at in self._by_mesh(instance):
-                lanes, instances = lane.take(at), instance.take(at)
-                start, along, excluded_prim = self._local(origin, direction, excluded, lanes, instances)
-                met = self._mesh(number, lanes).occluded(start, along, distance.take(lanes), excluded_prim)
+                lanes, instances = take(lane, at), take(instance, at)
+                start, along, excluded = self._local(origin, direction, exclude_prim, lanes, instances)
+                met = self._mesh(number, lanes).occluded(start, along, distance.take(lanes), excluded)
                 lanes = lanes.compress(met)
                 blocked[lanes] = True
                 t_far[lanes] = -1  # ends the search
@@ -98,34 +98,36 @@ class InstanceAccelerator:
         """Return the excluded primitives (n,), -1 for those of instances."""
         return np.where(exclude_prim < self._first, exclude_prim, -1)
 
-    def _exclude_instanced(self, exclude_prim: Ints) -> tuple[Ints, Ints]:
-        """Return the instances (n,) of excluded primitives, -1 for none, and their triangles in the mesh."""
-        instance = np.searchsorted(self.placements.first, exclude_prim, "right") - 1
-        return instance, exclude_prim - self.placements.first.take(instance)
-
     def _local(
-        self, origin: Floats, direction: Floats, excluded: tuple[Ints, Ints], lane: Ints, instance: Ints
+        self, origin: Floats, direction: Floats, exclude_prim: Ints, lane: Ints, instance: Ints
     ) -> tuple[Floats, Floats, Ints]:
         """Return rays `lane` (p,) in mesh coordinates of `instance` (p,): origin, direction, exclude_prim."""
-        m = self._matrices(lane, instance).reshape(3, 4, -1)
-        x, y, z = origin.take(lane, 1)
-        dx, dy, dz = direction.take(lane, 1)
+        points, ways = origin.take(lane, 1), direction.take(lane, 1)
         start, along = np.empty((3, lane.size), f4), np.empty((3, lane.size), f4)
+        entries = iter(self._matrices(lane, instance))
         for axis in range(3):
-            a, b, c, shift = m[axis]
-            start[axis] = a * x + b * y + c * z + shift
-            along[axis] = a * dx + b * dy + c * dz
-        excluded_instance, triangle = (of_lane.take(lane) for of_lane in excluded)
-        return start, along, np.where(excluded_instance == instance, triangle, -1)
+            *row, shift = islice(entries, 4)
+            start[axis] = _product(row, points) + shift
+            along[axis] = _product(row, ways)
+        prim = exclude_prim.take(lane) - self.placements.first.take(instance)
+        prim[(prim < 0) | (prim >= self._count.take(instance))] = -1  # of another instance, or none
+        return start, along, prim
 
-    def _matrices(self, lane: Ints, instance: Ints) -> Doubles:
-        """Return the matrices (12, p) from the scene to the coordinates of `instance` (p,)."""
+    def _matrices(self, lane: Ints, instance: Ints) -> Iterable[Doubles | np.float64]:
+        """Return the matrices (12, p) from the scene to the coordinates of `instance` (p,), row by row.
+
+        A row may be one number, the same for all rays.
+        """
+        return self._still(instance)
+
+    def _still(self, instance: Ints) -> Doubles:
+        """Return the matrices (12, p) of instances (p,) that stand still."""
         return self.placements.to_local.take(instance, 1)
 
-    def _by_mesh(self, instance: Ints) -> Iterator[tuple[int, Ints]]:
+    def _by_mesh(self, instance: Ints) -> Iterator[tuple[int, Lanes]]:
         """Yield each distinct mesh of `instance` (p,), and the indices of its instances there."""
         if len(self._meshes) == 1:
-            yield 0, np.arange(instance.size)
+            yield 0, ALL
             return
         mesh = self.placements.mesh.take(instance)
         order = np.argsort(mesh, kind="stable")
@@ -155,15 +157,25 @@ class InstanceAccelerator:
 
     def _alone(self, origin: Floats, direction: Floats, t_far: Floats) -> tuple[Ints, Ints]:
         """Return the lanes that may meet the only instance there is, and its number for each."""
-        with np.errstate(all="ignore"):
-            inverse = f4(1) / direction
-        root, every = np.zeros(min(CHUNK, t_far.size), np.intp), np.arange(t_far.size)
         met = [
-            self._children_met(root[: part.stop - part.start], every[part], origin, inverse, t_far)[1]
+            self._met(origin[:, part], direction[:, part], t_far[part]) + part.start
             for part in spans(t_far.size, CHUNK)
         ]
-        lane = np.concatenate([root[:0], *met])
+        lane = met[0] if len(met) == 1 else np.concatenate([np.zeros(0, np.intp), *met])
         return lane, np.zeros_like(lane)
+
+    def _met(self, origin: Floats, direction: Floats, t_far: Floats) -> Ints:
+        """Return which rays (3, n) meet the box of the only instance, as `_children_met` finds them."""
+        near, far = np.zeros(t_far.size, f4), t_far * (1 + ROUNDING)
+        with np.errstate(all="ignore"):
+            inverse = f4(1) / direction
+            for axis in range(3):
+                first, second = (
+                    (box[axis, 0, 0] - origin[axis]) * inverse[axis] for box in (self._low, self._high)
+                )
+                np.maximum(near, np.minimum(first, second), out=near)
+                np.minimum(far, np.maximum(first, second), out=far)
+            return np.flatnonzero(~(near * (1 - ROUNDING) > far * (1 + ROUNDING)))
 
     @property
     def _instance_bits(self) -> int:
@@ -214,6 +226,15 @@ class InstanceAccelerator:
         present = np.flatnonzero(child)
         entry = np.fmax(near.ravel().take(met.take(present)) * (1 - ROUNDING), f4(0)) + f4(0)  # never -0
         return child.take(present), lane.take(pair.take(present)), entry
+
+
+def _product(row: Sequence[Doubles | np.float64], vectors: Floats) -> Doubles:
+    """Return the products (p,) of a row of matrices, 3 × (p,), and vectors (3, p)."""
+    terms = [factor * values for factor, values in zip(row, vectors, strict=True) if np.ndim(factor) or factor]
+    total = terms.pop(0)
+    for term in terms:
+        total += term
+    return total
 
 
 def _pack(lane: Ints, near: Floats, instance: Ints, bits: int) -> NDArray[np.int64]:

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from copy import copy
+from collections.abc import Iterable, Sequence
 from typing import Any, Self
 
 import numpy as np
@@ -56,7 +55,8 @@ class MovingInstances(InstanceAccelerator):
 
     def _at(self, exclude_prim: Ints, time: Doubles | None = None) -> Self:
         """Return the accelerator for rays at times (n,)."""
-        query = copy(self)
+        query = object.__new__(type(self))  # as `copy` does, which takes ten times as long
+        query.__dict__.update(self.__dict__)
         query._time = np.full(exclude_prim.size, self._motions.middle) if time is None else time
         return query
 
@@ -65,11 +65,11 @@ class MovingInstances(InstanceAccelerator):
         accelerator: Accelerator = mesh.at(self._time.take(lanes)) if self._deforms[number] else mesh
         return accelerator
 
-    def _matrices(self, lane: Ints, instance: Ints) -> Doubles:
+    def _matrices(self, lane: Ints, instance: Ints) -> Iterable[Doubles | np.float64]:
         mover = self._mover.take(instance)
         moves = np.flatnonzero(mover >= 0)
         if moves.size == lane.size:
-            return self._motions.at(mover, self._time.take(lane))
-        matrices = super()._matrices(lane, instance)
+            return self._motions.entries(mover, self._time.take(lane))
+        matrices = self._still(instance)
         matrices[:, moves] = self._motions.at(mover.take(moves), self._time.take(lane.take(moves)))
         return matrices

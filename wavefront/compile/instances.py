@@ -42,16 +42,8 @@ class InstanceTable(SoA):
         instance = np.searchsorted(self.first[1:], prim, "right")
         return prim - self.shift.take(instance), instance
 
-    def normals_to_scene(self, normals: Floats) -> Floats:
-        """Transform unit normals (3, p) of meshes to the scene; the results have any length."""
-        return _times(self.normal, normals)
 
-    def vectors_to_scene(self, vectors: Floats) -> Floats:
-        """Transform vectors (3·k, p) of meshes, k for each column, to the scene."""
-        return np.concatenate([_times(self.linear, vectors[i : i + 3]) for i in range(0, len(vectors), 3)])
-
-
-def _times(m: Floats, vectors: Floats) -> Floats:
+def times(m: Floats, vectors: Floats) -> Floats:
     """Return the products of matrices (9, p), row by row, and vectors (3, p)."""
     x, y, z = vectors
     return np.stack([m[i] * x + m[i + 1] * y + m[i + 2] * z for i in (0, 3, 6)])

@@ -20,15 +20,17 @@ from ..accel.moving import MovingInstances
 from ..accel.sphere import SpherePrimitives
 from ..arrays.soa import soa
 from ..arrays.state import Hits
-from ..arrays.vec import Bools, Doubles, Floats, Ints, f4
+from ..arrays.vec import Bools, Doubles, Floats, Ints, f4, spans
 from ..motion.shutter import Shutter
-from ..motion.steps import Matrices, Motions, step_at
+from ..motion.steps import Matrices, Motions, inverse_linear, step_at
 from ..scene import Scene
 from ..shapes import Instance, Mesh
 from ..shapes.attributes import Corners, corner_values
 from .geometry import compute_corner_normals, compute_face_normals
 
 BOX_ROOM = 2.0**-17  # margin of boxes of moving shapes, relative to their size
+BOX_TIMES = 9  # of each step of a motion, at which its box is found
+BOXES_AT_ONCE = 1 << 12  # steps
 FAST = 4.0  # edges that corners of a deforming mesh may go within a step
 MOST_PARTS = 4  # into which such a step is divided
 IDENTITY = np.eye(4)
@@ -164,6 +166,7 @@ class MotionTable:
     curved: tuple[CurvedRows, ...]
     lights: Motions | None = None  # of those in `motion_of_light`
     motion_of_light: dict[int, int] = field(default_factory=dict)  # by their numbers in the scene
+    all_move: bool = False  # whether no instance stands still
 
     def is_rigid(self, row: Ints) -> Bools:
         """Return which rows (n,) of the scene's tables are of no mesh that deforms."""
@@ -306,7 +309,9 @@ def motion_table(
         return MotionTable(shutter, None, np.full(2, -1), np.ones(2), columns.column_of_row, (), ())
     low, high = (np.stack(corners) for corners in zip(*columns.boxes, strict=True))
     reach = np.linalg.norm(np.maximum(np.abs(low), np.abs(high)), axis=1)
-    motions = Motions.of(columns.matrices, shutter.begin, shutter.end, reach, exposed.keys)
+    moving = [*numbers[k:].tolist(), *numbers[k - len(kinds) : k].tolist()]
+    names = [exposed.scene.shapes[number].name for number in moving if number in exposed.movers]
+    motions = Motions.of(columns.matrices, shutter.begin, shutter.end, reach, exposed.keys, names)
     mover = np.array(columns.mover)
     moves = np.flatnonzero(mover >= 0)
     placements.low[:, moves], placements.high[:, moves] = _swept_boxes(motions, low, high)
@@ -319,6 +324,7 @@ def motion_table(
         columns.column_of_row,
         tuple(columns.deforming.values()),
         tuple(columns.curved),
+        all_move=moves.size == mover.size,
     )
 
 
@@ -434,18 +440,27 @@ def _half_box(mesh: Mesh) -> tuple[Doubles, Doubles]:
 
 def _swept_boxes(motions: Motions, low: Doubles, high: Doubles) -> tuple[Floats, Floats]:
     """Return the corners (3, m) of boxes around moving shapes at all times, from their own boxes (m, 3)."""
+    rows, own_middle, own_half = np.arange(len(low) * motions.steps), (low + high).T / 2, (high - low).T / 2
     lows, highs = [], []
-    to_local = motions.to_local.T.reshape(len(low), -1, 3, 4)
-    for own_low, own_high, matrix in zip(low, high, to_local, strict=True):
-        to_scene = np.linalg.inv(matrix[:, :, :3])
-        own_middle, half = (own_low + own_high) / 2, (own_high - own_low) / 2
-        middle = (to_scene * (own_middle - matrix[:, :, 3])[:, None]).sum(2)
-        reach = (np.abs(to_scene) * half).sum(2)
-        box = (middle - reach).min(0), (middle + reach).max(0)
-        room = BOX_ROOM * (np.abs(box).max() + np.ptp(box, axis=0).max())
-        lows.append(box[0] - room)
-        highs.append(box[1] + room)
-    return np.stack(lows, 1).astype(f4), np.stack(highs, 1).astype(f4)
+    for some in spans(rows.size, BOXES_AT_ONCE):
+        number, step = np.divmod(rows[some], motions.steps)
+        times = motions.times_in(step, BOX_TIMES)
+        matrix = motions.at(np.repeat(number, BOX_TIMES), times.ravel())
+        to_scene = inverse_linear(matrix).reshape(3, 3, number.size, BOX_TIMES)
+        shift = own_middle.take(number, 1)[:, :, None] - matrix[3::4].reshape(3, number.size, BOX_TIMES)
+        middle = (to_scene * shift).sum(1)
+        reach = (np.abs(to_scene) * own_half.take(number, 1)[:, :, None]).sum(1)
+        lows.append(-_highest(reach - middle))
+        highs.append(_highest(reach + middle))
+    lowest, highest = (np.concatenate(each, 1).reshape(3, len(low), -1) for each in (lows, highs))
+    box = np.stack([lowest.min(2), highest.max(2)])
+    room = BOX_ROOM * (np.abs(box).max((0, 1)) + np.ptp(box, axis=0).max(0))
+    return (box[0] - room).astype(f4), (box[1] + room).astype(f4)
+
+
+def _highest(values: Doubles) -> Doubles:
+    """Return bounds (3, k) of what has some values (3, k, times) at evenly spaced times, and between them."""
+    return np.asarray(values.max(2) + np.abs(np.diff(values, 2, 2)).max(2) / 4)
 
 
 def with_places(bounds: Doubles, placements: Placements) -> Doubles:
@@ -518,7 +533,8 @@ def light_motions(
     shutter = exposed.shutter
     matrices = [_about(moving, shutter, center, factor) for moving in exposed.lights.values()]
     reaches = np.full(len(matrices), reach)
-    motions = Motions.of(matrices, shutter.begin, shutter.end, reaches, exposed.keys)
+    names = [type(exposed.scene.lights[number]).__name__ for number in exposed.lights]
+    motions = Motions.of(matrices, shutter.begin, shutter.end, reaches, exposed.keys, names)
     return motions, {number: row for row, number in enumerate(exposed.lights)}
 
 

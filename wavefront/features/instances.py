@@ -8,7 +8,8 @@ import numpy as np
 
 from ..accel import Intersections
 from ..arrays.state import Hits, Rays
-from ..arrays.vec import Floats, Ints, Lanes, f4, length, normalize, take
+from ..arrays.vec import ALL, Floats, Ints, Lanes, f4, length, normalize, put, take
+from ..compile.instances import InstanceTable, times
 from ..compile.program import Facts, Feature
 from ..compile.scene import CompiledScene
 from ..stages.interaction import POINT_ERROR, Surfaces
@@ -21,8 +22,7 @@ class InstancedSurfaces(Surfaces):
 
     def __init__(self, scene: CompiledScene, rays: Rays, hits: Hits) -> None:
         super().__init__(scene, rays, hits)
-        assert scene.instances is not None
-        self.instances = None if hits.instance is None else scene.instances.take(hits.instance)
+        self.column = hits.instance
 
     @classmethod
     def hits_of(cls, scene: CompiledScene, intersections: Intersections) -> Hits:
@@ -45,7 +45,26 @@ class InstancedSurfaces(Surfaces):
     def prims(self) -> Ints:
         """Return primitive ids, which differ between instances."""
         prim = super().prims()
-        return prim if self.instances is None else prim + self.instances.shift
+        return prim if self.column is None else prim + self._table.shift.take(self.column)
+
+    @property
+    def _table(self) -> InstanceTable:
+        assert self.scene.instances is not None
+        return self.scene.instances
+
+    def placed_lanes(self) -> Lanes:
+        """Return the lanes (k,) that may have transforms."""
+        return ALL
+
+    def normal_matrices(self, lanes: Lanes) -> Floats:
+        """Return the matrices (9, k) of normals to the scene, of some lanes."""
+        assert self.column is not None
+        return self._table.normal.take(take(self.column, lanes), 1)
+
+    def vector_matrices(self) -> Floats:
+        """Return the matrices (9, n) of vectors to the scene."""
+        assert self.column is not None
+        return self._table.linear.take(self.column, 1)
 
     def normals(self, point: Floats, error: Floats) -> tuple[Floats, Floats]:
         """Transform unit normals of meshes to the scene, and enlarge the errors (n,) of hit points.
@@ -55,26 +74,35 @@ class InstancedSurfaces(Surfaces):
         the transformed normal converts a length along the normal from these coordinates to the scene.
         """
         ng, error = super().normals(point, error)
-        if self.instances is None:
+        if self.column is None:
             return ng, error
-        ng = self.instances.normals_to_scene(ng)
-        size = length(ng)
+        lanes = self.placed_lanes()
+        there = times(self.normal_matrices(lanes), take(ng, lanes))
+        size = length(there)
         size = np.where(size > 0, size, f4(1))
-        return ng / size, error + POINT_ERROR * (self.instances.radius + self.hits.t) / size
+        more = POINT_ERROR * (self._table.radius.take(take(self.column, lanes)) + take(self.hits.t, lanes)) / size
+        if isinstance(lanes, slice):
+            return there / size, error + more
+        put(ng, lanes, there / size)
+        error[lanes] += more
+        return ng, error
 
     def corner_normals(self, corners: list[Floats]) -> list[Floats]:
         """Transform normals of vertices, and normalize each as in a mesh of its own.
 
         A skewed transform changes their lengths.
         """
-        if self.instances is None:
+        if self.column is None:
             return corners
-        corners = super().corner_normals(corners)
-        return [normalize(self.instances.normals_to_scene(corner)) for corner in corners]
+        corners, matrices = super().corner_normals(corners), self.normal_matrices(ALL)
+        return [normalize(times(matrices, corner)) for corner in corners]
 
     def vectors(self, values: Floats) -> Floats:
-        """Transform vectors along surfaces to the scene."""
-        return values if self.instances is None else self.instances.vectors_to_scene(values)
+        """Transform vectors along surfaces (3·k, n), k for each, to the scene."""
+        if self.column is None:
+            return values
+        matrices = self.vector_matrices()
+        return np.concatenate([times(matrices, values[i : i + 3]) for i in range(0, len(values), 3)])
 
 
 class Instances(Feature):

@@ -9,7 +9,7 @@ import numpy as np
 
 from ..arrays.soa import soa
 from ..arrays.state import Hits, Rays, SurfaceInteraction, Words
-from ..arrays.vec import Doubles, Floats, Ints, f4, normalize
+from ..arrays.vec import ALL, Doubles, Floats, Ints, Lanes, f4, normalize, put
 from ..camera import Camera
 from ..camera.poses import upright
 from ..compile.program import Facts, Feature
@@ -20,6 +20,7 @@ from ..sampling.tiles import Tiles
 from ..stages.interaction import Surfaces
 from ..stages.intersect import ShadowRays
 from ..stages.shade import LightRays, Shading
+from .instances import InstancedSurfaces
 
 
 class DeformingSurfaces(Surfaces):
@@ -88,7 +89,7 @@ class TimedSurfaces(Surfaces):
         return surface
 
 
-class MovingSurfaces(Surfaces):
+class MovingSurfaces(InstancedSurfaces):
     """Surfaces some of which are at other places at other times."""
 
     __slots__ = ("_matrix", "_moves")
@@ -98,16 +99,34 @@ class MovingSurfaces(Surfaces):
         table = scene.motion
         assert table is not None
         assert table.motions is not None
-        assert scene.instances is not None
-        column = table.column_at(hits)
-        if self.instances is None:
-            self.instances = scene.instances.take(column)
-        mover = table.mover.take(column)
+        self.column = table.column_at(hits)
+        mover = table.mover.take(self.column)
         self._moves = np.flatnonzero(mover >= 0)
         time = times_of(scene, rays).take(self._moves)
         self._matrix = table.motions.at(mover.take(self._moves), time)
-        scale = table.scale.take(column.take(self._moves))
-        self.instances.normal[:, self._moves] = self._matrix.take(TRANSPOSED, 0) * scale
+
+    def placed_lanes(self) -> Lanes:
+        """Return the lanes (k,) that may have transforms: where no instance stands still, those that move."""
+        assert self.scene.motion is not None
+        return self._moves if self.scene.motion.all_move else ALL
+
+    def normal_matrices(self, lanes: Lanes) -> Floats:
+        """Return the matrices (9, k) of normals to the scene, as it is then."""
+        assert self.scene.motion is not None
+        assert self.column is not None
+        moving = self._matrix.take(TRANSPOSED, 0)
+        moving *= self.scene.motion.scale.take(self.column.take(self._moves))
+        if lanes is self._moves:
+            return moving.astype(f4)
+        matrices = super().normal_matrices(lanes)
+        put(matrices, self._moves, moving)
+        return matrices
+
+    def vector_matrices(self) -> Floats:
+        """Return the matrices (9, n) of vectors to the scene, as it is then."""
+        matrices = super().vector_matrices()
+        put(matrices, self._moves, inverse_linear(self._matrix))
+        return matrices
 
     @classmethod
     def moment(cls, rays: Rays) -> tuple[Doubles, ...]:
@@ -160,12 +179,6 @@ class MovingSurfaces(Surfaces):
     def _curved(self) -> Ints:
         """Return which of the lanes that move are on curved shapes, (k,)."""
         return np.flatnonzero(self.hits.prim.take(self._moves) >= self.scene.triangles)
-
-    def vectors(self, values: Floats) -> Floats:
-        """Transform vectors along surfaces to the scene, as it is then."""
-        assert self.instances is not None
-        self.instances.linear[:, self._moves] = inverse_linear(self._matrix)
-        return super().vectors(values)
 
 
 TRANSPOSED = np.array([0, 4, 8, 1, 5, 9, 2, 6, 10])  # rows of matrices (12, n) to those of transposed (9, n)
@@ -268,4 +281,4 @@ def motions_of_camera(camera: Camera, shutter: Shutter, center: Doubles, factor:
         moved[:, :3, 3] = moved[:, :3, 3] * factor + (moved[:, :3, :3] * center).sum(2) - center
         return moved
 
-    return Motions.of([matrices], shutter.begin, shutter.end, np.ones(1), motion.keys)
+    return Motions.of([matrices], shutter.begin, shutter.end, np.ones(1), motion.keys, ["Camera"])

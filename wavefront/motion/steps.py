@@ -1,46 +1,68 @@
-"""Motions while a shutter is open: matrices at evenly spaced times, and between these by linear steps."""
+"""Motions while a shutter is open: matrices that go over from one time to the next along lines or parabolas.
+
+The steps between these times are halved where a motion needs that: where it is fast, and at the keys of
+keyframes, where it has bends.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from typing import Self
 
 import numpy as np
 
 from ..arrays.soa import soa
 from ..arrays.vec import Doubles, Floats, Ints
+from ..core.errors import warn_caller
 
 Matrices = Callable[[Doubles], Doubles]  # from times (n,) to matrices (n, 4, 4)
 
-ERROR = 2.0**-20  # of places, relative to the size of what is placed: what linear steps may leave out
+ERROR = 2.0**-20  # of places, relative to the size of what is placed: what steps may leave out
+TOLERATED = 2.0**-12  # the same where steps are not enough; more is warned of
 LEAST_SCALE = 1e-9  # of what a motion flattens, relative to its greatest
-MOST_STEPS = 1 << 12
+FIRST_STEPS = 16  # that are tried first, if not fewer are allowed
+SHORTEST = 2.0**-20  # step, relative to the whole time: a jump takes this long
+MOST_LINES = 1 << 9  # steps along lines; of parabolas fewer are enough, but they take longer
+MOST_STEPS = 1 << 16
 MOST_MATRICES = 1 << 17  # of all motions; many motions have fewer steps
-# parts of a step after which it is tested: uneven, so that whole turns are not taken for rest
-PARTS = np.array([0.2113, 0.5309, 0.7927])
-UNEVEN = 64  # further times at which all steps are tested, by the golden ratio
+NODES = np.array([0, 0.5, 1])  # of a step, where its parabolas have the numbers of the motion
+BETWEEN = np.array([0.2113, 0.7887])  # where they are farthest from it
+UNEVEN = 64  # further times at which one step is tested, by the golden ratio
 GOLDEN = (5**0.5 - 1) / 2
-NO_KEYS = np.zeros(0)
+STRAIGHT = 2.0**-44  # relative differences by which numbers that change evenly are off in float64
+BINS = 1024  # of the time, to find the steps of times
 
 
 @soa
 class Motions:
     """m motions while a shutter is open, as matrices from the scene to what moves.
 
-    Between two of the evenly spaced times each matrix goes over to the next one linearly. A translation of
-    constant velocity is exact so, with one step.
+    Within a step each of the numbers of a matrix is a polynomial of the part of the step that is over. A
+    translation of constant velocity is exact so, with one step.
     """
 
     begin: float  # when the shutter opens, s
     seconds: float  # how long it is open
     steps: int
-    to_local: Doubles  # (12, m * (steps + 1)) the (3, 4) matrices, row by row
+    start: Doubles  # (steps + 1,) where steps begin, and the last one ends, as parts of the time
+    first_of: Ints  # (BINS + 1,) the step at the beginning of each bin
+    # (12, m * steps) for each step of each motion: the (3, 4) matrix at its beginning, row by row
+    to_local: Doubles
+    slope: list[Doubles | None]  # 12 × (m * steps,) its change by a part of the step; None where there is none
+    bend: list[Doubles | None]  # 12 × (m * steps,) the same by the square of that part
+    error: Doubles  # (m,) of places that steps leave out, relative to the size of what moves; jumps aside
 
     @classmethod
     def of(
-        cls, motions: Sequence[Matrices], begin: float, end: float, reach: Doubles, keys: Doubles = NO_KEYS
+        cls,
+        motions: Sequence[Matrices],
+        begin: float,
+        end: float,
+        reach: Doubles,
+        keys: Doubles,
+        names: Sequence[str],
     ) -> Self:
-        """Return motions as tables of as many steps as they need.
+        """Return motions as tables of as many steps as they need, and warn of those that need too many.
 
         Parameters
         ----------
@@ -50,46 +72,101 @@ class Motions:
             (m,) how far from the origin of its own coordinates each reaches.
         keys
             (k,) times at which they may go another way, s.
+        names
+            Of what moves, m of them.
         """
-        most = min(MOST_STEPS, max(MOST_MATRICES // len(motions), 1))
-        bends, steps = _bends(keys, begin, end, 4 * most), 1
-        while True:
-            to_local = _inverse(_placed(motions, np.linspace(begin, end, steps + 1)))
-            found = cls(begin, end - begin, steps, np.ascontiguousarray(to_local.reshape(-1, 12).T))
-            if steps >= most:
-                return found
-            between = begin + (end - begin) * ((np.arange(steps)[:, None] + PARTS) / steps).ravel()
-            tests = np.concatenate([between, bends])
-            if found._error(tests, _placed(motions, tests), reach) <= ERROR:
-                return found
-            steps *= 2
+        table = cls._of(motions, begin, end, reach, keys)
+        fast = np.flatnonzero(table.error > TOLERATED)
+        if fast.size:
+            worst, more = int(fast[table.error[fast].argmax()]), fast.size - 1
+            warn_caller(
+                f"{names[worst]}: moves too fast while the shutter is open for a table of {table.steps} steps: "
+                f"places are off by up to {table.error[worst]:.2g} of the size of what moves; "
+                f"{TOLERATED:.2g} is tolerated" + (f" (and {more} more like it)" if more else "")
+            )
+        return table
 
-    def _error(self, times: Doubles, placed: Doubles, reach: Doubles) -> float:
-        """Return the error of places at times (k,), relative to the size of what is placed.
+    @classmethod
+    def _of(
+        cls, motions: Sequence[Matrices], begin: float, end: float, reach: Doubles, keys: Doubles
+    ) -> Self:
+        """Return the table: of lines where these do not need many steps, or else of parabolas."""
+        room = max(1, min(MOST_STEPS, MOST_MATRICES // len(motions)))
+        between = (_bends(keys, begin, end, 4 * room) - begin) / (end - begin)
+        whole = _steps_at(motions, begin, end, np.array([0.0, 1.0]), np.append(BETWEEN, between))
+        size = _sizes(whole.placed, reach)
+        scale = reach, size
+        for straight in (True, False):
+            whole.error = _errors(whole, *scale, straight)
+            if whole.error.max() <= ERROR or (room < FIRST_STEPS and not straight):
+                return cls._joined([whole], begin, end, straight)
+        first = np.unique(np.append((keys - begin) / (end - begin), np.arange(FIRST_STEPS + 1) / FIRST_STEPS))
+        first = first[(first >= 0) & (first <= 1)]
+        if first.size > room:
+            first = np.arange(FIRST_STEPS + 1) / FIRST_STEPS
+        lines = _divided(motions, begin, end, first, scale, min(room, MOST_LINES), True)
+        if np.concatenate([part.error for part in lines], 1).max() <= ERROR:
+            return cls._joined(lines, begin, end, True)
+        return cls._joined(_divided(motions, begin, end, first, scale, room, False), begin, end, False)
 
-        It is of places at most `reach` (m,) from the origins of their coordinates: where the matrices take
-        them that `placed` (m, k, 4, 4) has put into the scene.
-        """
-        rows, there = np.arange(len(placed)).repeat(times.size), placed[:, :, :3]
-        back = self.at(rows, np.tile(times, len(placed))).T.reshape(there.shape)
-        turned, shifted = back[..., :3] @ there[..., :3] - np.eye(3), back[..., :3] @ there[..., 3:]
-        off = np.sqrt(((shifted[..., 0] + back[..., 3]) ** 2).sum(-1))
-        worst = (np.sqrt((turned**2).sum((-1, -2))) * reach[:, None] + off).max(1)
-        scale = np.sqrt((there[..., :3] ** 2).sum((-1, -2)) / 3).max(1)
-        size = reach + np.ptp(there[..., 3], axis=1).max(1) / scale
-        return float((worst / np.where(size > 0, size, 1)).max())
+    @classmethod
+    def _joined(cls, parts: Sequence[_Steps], begin: float, end: float, straight: bool) -> Self:
+        """Return the table of some steps."""
+        start = np.concatenate([part.start for part in parts])
+        order = np.argsort(start)
+        start = np.append(start[order], 1.0)
+        local = np.concatenate([part.to_local for part in parts], 1)[:, order]
+        error = np.concatenate([part.error for part in parts], 1).max(1)
+        before, middle, after = local[:, :, :3].reshape(-1, 3, 12).transpose(1, 2, 0)
+        bend, change = 2 * (before + after - 2 * middle) * (not straight), after - before
+        scale = STRAIGHT * np.maximum(np.abs(before), np.abs(after)).max(1)
+        curved, moves = ((np.abs(each).max(1) > scale).tolist() for each in (bend, change))
+        rows = range(12)
+        return cls(
+            begin,
+            end - begin,
+            start.size - 1,
+            start,
+            np.minimum(np.searchsorted(start, np.arange(BINS + 1) / BINS, "right") - 1, start.size - 2),
+            np.ascontiguousarray(before),
+            [change[i] - bend[i] if curved[i] else change[i] if moves[i] else None for i in rows],
+            [bend[i].copy() if curved[i] else None for i in rows],
+            error,
+        )
 
     def at(self, number: Ints, time: Doubles) -> Doubles:
         """Return the (3, 4) matrices of some motions (n,) at times (n,), row by row, (12, n)."""
-        place = np.clip((time - self.begin) * (self.steps / self.seconds), 0, self.steps)
-        step = np.minimum(place.astype(np.intp), self.steps - 1)
-        part = place - step
-        row = number * (self.steps + 1) + step
-        before = self.to_local.take(row, 1)
-        after = self.to_local.take(row + 1, 1)
-        after -= before
-        after *= part
-        return np.add(before, after, out=after)
+        matrix = np.empty((12, time.size))
+        for out, values in zip(matrix, self.entries(number, time), strict=True):
+            out[:] = values
+        return matrix
+
+    def entries(self, number: Ints, time: Doubles) -> Iterator[Doubles | np.float64]:
+        """Yield the 12 numbers of these matrices, each (n,), or one where it is the same for all."""
+        step, part = self._step_at(np.clip((time - self.begin) / self.seconds, 0, 1))
+        alone = self.error.size == 1
+        row = step if alone else number * self.steps + step
+        for values, slopes, bends in zip(self.to_local, self.slope, self.bend, strict=True):
+            if slopes is None:
+                yield values[0] if alone else values.take(row)
+                continue
+            change = slopes.take(row)
+            if bends is not None:
+                change += bends.take(row) * part
+            change *= part
+            change += values.take(row)
+            yield change
+
+    def _step_at(self, place: Doubles) -> tuple[Ints, Doubles]:
+        """Return in which steps parts of the time (n,) are, and after what part of these."""
+        if self.steps == 1:
+            return np.zeros(place.size, np.intp), place
+        step = self.first_of.take((place * BINS).astype(np.intp))
+        later = np.flatnonzero(place >= self.start.take(step + 1))  # most bins are in one step
+        step[later] = np.searchsorted(self.start, place.take(later), "right") - 1
+        np.minimum(step, self.steps - 1, out=step)
+        begin = self.start.take(step)
+        return step, (place - begin) / (self.start.take(step + 1) - begin)
 
     @property
     def middle(self) -> float:
@@ -102,6 +179,77 @@ class Motions:
         return found
 
 
+    def times_in(self, step: Ints, count: int) -> Doubles:
+        """Return times (k, count), s, evenly spaced over some steps (k,), with both ends."""
+        begin, end = self.start.take(step)[:, None], self.start.take(step + 1)[:, None]
+        return self.begin + self.seconds * (begin + (end - begin) * np.linspace(0, 1, count))
+
+
+@soa
+class _Steps:
+    """Steps of m motions while their table is built."""
+
+    start: Doubles  # (k,) as parts of the time
+    parts: Doubles  # (p,) of each step: `NODES`, and others
+    placed: Doubles  # (m, k, p, 3, 4) to the scene then
+    to_local: Doubles  # (m, k, p, 3, 4) the inverses
+    error: Doubles  # (m, k) see `_errors`
+
+    def take(self, index: Ints) -> _Steps:
+        """Return some of the steps."""
+        arrays = (each[:, index] for each in (self.placed, self.to_local, self.error))
+        return _Steps(self.start[index], self.parts, *arrays)
+
+
+def _divided(
+    motions: Sequence[Matrices],
+    begin: float,
+    end: float,
+    first: Doubles,
+    scale: tuple[Doubles, Doubles],
+    room: int,
+    straight: bool,
+) -> list[_Steps]:
+    """Return steps, halved until they are short enough, but not many more than `room`.
+
+    Parameters
+    ----------
+    first
+        (k + 1,) the parts of the time between which the longest steps lie.
+    scale
+        As of `_errors`.
+    """
+    done, ends = list[_Steps](), np.stack([first[:-1], first[1:]])
+    while ends.size:
+        steps = _steps_at(motions, begin, end, ends, BETWEEN)
+        width = ends[1] - ends[0]
+        steps.error = _errors(steps, *scale, straight)
+        worst = steps.error.max(0)
+        long = np.flatnonzero((worst > ERROR) & (width > SHORTEST))
+        room -= width.size
+        if long.size > room:
+            long = np.sort(long[np.argsort(-worst[long], kind="stable")[: max(room, 0)]])
+        steps.error[:, width <= SHORTEST] = 0  # of a jump
+        done.append(steps.take(np.setdiff1d(np.arange(width.size), long)))
+        room += long.size
+        middle = ends[:, long].mean(0)
+        ends = np.stack([np.append(ends[0, long], middle), np.append(middle, ends[1, long])])
+    return done
+
+
+def _steps_at(
+    motions: Sequence[Matrices], begin: float, end: float, ends: Doubles, between: Doubles
+) -> _Steps:
+    """Return steps between parts `ends` (2, k) of the time, with matrices at `NODES` and `between`."""
+    parts, (start, stop) = np.append(NODES, between), ends.reshape(2, -1)
+    places = start[:, None] + (stop - start)[:, None] * parts
+    placed = np.stack([motion(begin + (end - begin) * places.ravel()) for motion in motions])
+    placed[:, :, :3, :3] = _thickened(placed[:, :, :3, :3])
+    shape = len(motions), start.size, parts.size, 3, 4
+    to_local = np.linalg.inv(placed)[:, :, :3].reshape(shape)
+    return _Steps(start, parts, placed[:, :, :3].reshape(shape), to_local, np.zeros(shape[:2]))
+
+
 def _bends(keys: Doubles, begin: float, end: float, most: int) -> Doubles:
     """Return keys between two times, the middles between them, and uneven times; at most so many of each."""
     inside = np.unique(keys[(keys > begin) & (keys < end)])
@@ -111,26 +259,44 @@ def _bends(keys: Doubles, begin: float, end: float, most: int) -> Doubles:
     return np.concatenate([inside, (ends[1:] + ends[:-1]) / 2, uneven])
 
 
-def _placed(motions: Sequence[Matrices], times: Doubles) -> Doubles:
-    """Return the matrices (m, k, 4, 4) of motions at times (k,), such that they can be inverted."""
-    placed = np.stack([motion(times) for motion in motions])
-    placed[:, :, :3, :3] = _thickened(placed[:, :, :3, :3])
-    return placed
-
-
-def _inverse(placed: Doubles) -> Doubles:
-    """Return the inverses (m, k, 3, 4) of affine matrices (m, k, 4, 4)."""
-    return np.asarray(np.linalg.inv(placed)[:, :, :3], np.float64)
-
-
 def _thickened(linear: Doubles) -> Doubles:
     """Return linear parts (m, k, 3, 3) that can be inverted: what is flattened stays very thin."""
+    largest = np.sqrt((linear**2).sum((2, 3))).max(1)
+    volume = (np.cross(linear[..., 0], linear[..., 1]) * linear[..., 2]).sum(-1)
+    if (np.abs(volume) > LEAST_SCALE * (largest**3)[:, None]).all():  # a bound that needs no decomposition
+        return linear
     u, scales, v = np.linalg.svd(linear)
     thin = np.maximum(scales, LEAST_SCALE * scales.max((1, 2), keepdims=True))
     flat = (thin > scales).any(2)
     found = linear.copy()
     found[flat] = (u[flat] * thin[flat][:, None]) @ v[flat]
     return found
+
+
+def _sizes(placed: Doubles, reach: Doubles) -> Doubles:
+    """Return the sizes (m,) of what moves together with its way, in its own units."""
+    where = placed[..., 3].reshape(len(placed), -1, 3)
+    scale = np.sqrt((placed[..., :3] ** 2).sum((-1, -2)) / 3).max((1, 2))
+    return np.asarray(reach + np.ptp(where, axis=1).max(1) / scale)
+
+
+def _errors(steps: _Steps, reach: Doubles, size: Doubles, straight: bool) -> Doubles:
+    """Return the errors (m, k) of steps, relative to the sizes (m,) of what moves.
+
+    They are of places at most `reach` (m,) from the origins of their coordinates: where the lines or parabolas
+    take them that the motion has put into the scene.
+    """
+    before, middle, after = (steps.to_local[:, :, node] for node in range(3))
+    worst = np.zeros(steps.error.shape)
+    for number, part in enumerate(steps.parts[3:].tolist(), 3):
+        there = steps.placed[:, :, number]
+        back = before + part * (after - before)
+        if not straight:
+            back += 2 * part * (part - 1) * (before + after - 2 * middle)
+        turned, shifted = back[..., :3] @ there[..., :3] - np.eye(3), back[..., :3] @ there[..., 3:]
+        off = np.sqrt(((shifted[..., 0] + back[..., 3]) ** 2).sum(-1))
+        worst = np.maximum(worst, np.sqrt((turned**2).sum((-1, -2))) * reach[:, None] + off)
+    return worst / np.where(size > 0, size, 1)[:, None]
 
 
 def applied(matrix: Doubles, points: Floats | Doubles) -> Doubles:

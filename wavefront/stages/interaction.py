@@ -23,7 +23,6 @@ from ..arrays.vec import (
     signs,
     take,
 )
-from ..compile.instances import InstanceTable
 from ..compile.scene import CompiledScene
 from ..shapes.attributes import ATTRIBUTES, Corners
 
@@ -36,11 +35,11 @@ LIFT = f4(0.01)  # directions below the surface are raised to this cosine with `
 class Surfaces:
     """The surfaces that rays have hit. Features with a subclass change their data."""
 
-    __slots__ = ("hits", "instances", "rays", "scene")
+    __slots__ = ("column", "hits", "rays", "scene")
 
     def __init__(self, scene: CompiledScene, rays: Rays, hits: Hits) -> None:
         self.scene, self.rays, self.hits = scene, rays, hits
-        self.instances: InstanceTable | None = None  # of the hits, where any are instances
+        self.column: Ints | None = None  # (n,) of the `InstanceTable`; None where nothing is instanced
 
     @classmethod
     def hits_of(cls, scene: CompiledScene, intersections: Intersections) -> Hits:
