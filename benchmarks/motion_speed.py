@@ -96,7 +96,9 @@ def crowd() -> list[wf.Shape]:
 def deforming(way: Callable[[np.ndarray, float], np.ndarray], smooth: bool = False) -> wf.Shape:
     """Return a mesh of 100 000 triangles whose vertices go along lines between five forms."""
     vertices, faces = bumpy(100_000)
-    return wf.Mesh(np.stack([way(vertices, time) for time in TIMES.tolist()]), faces, times=TIMES, smooth=smooth)
+    return wf.Mesh(
+        np.stack([way(vertices, time) for time in TIMES.tolist()]), faces, times=TIMES, smooth=smooth
+    )
 
 
 def breathe(v: np.ndarray, time: float) -> np.ndarray:

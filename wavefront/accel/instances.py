@@ -230,7 +230,9 @@ class InstanceAccelerator:
 
 def _product(row: Sequence[Doubles | np.float64], vectors: Floats) -> Doubles:
     """Return the products (p,) of a row of matrices, 3 × (p,), and vectors (3, p)."""
-    terms = [factor * values for factor, values in zip(row, vectors, strict=True) if np.ndim(factor) or factor]
+    terms = [
+        factor * values for factor, values in zip(row, vectors, strict=True) if np.ndim(factor) or factor
+    ]
     total = terms.pop(0)
     for term in terms:
         total += term

@@ -309,8 +309,8 @@ def motion_table(
         return MotionTable(shutter, None, np.full(2, -1), np.ones(2), columns.column_of_row, (), ())
     low, high = (np.stack(corners) for corners in zip(*columns.boxes, strict=True))
     reach = np.linalg.norm(np.maximum(np.abs(low), np.abs(high)), axis=1)
-    moving = [*numbers[k:].tolist(), *numbers[k - len(kinds) : k].tolist()]
-    names = [exposed.scene.shapes[number].name for number in moving if number in exposed.movers]
+    order = [*numbers[k:].tolist(), *numbers[k - len(kinds) : k].tolist()]
+    names = [exposed.scene.shapes[number].name for number in order if number in exposed.movers]
     motions = Motions.of(columns.matrices, shutter.begin, shutter.end, reach, exposed.keys, names)
     mover = np.array(columns.mover)
     moves = np.flatnonzero(mover >= 0)

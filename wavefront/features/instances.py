@@ -80,7 +80,11 @@ class InstancedSurfaces(Surfaces):
         there = times(self.normal_matrices(lanes), take(ng, lanes))
         size = length(there)
         size = np.where(size > 0, size, f4(1))
-        more = POINT_ERROR * (self._table.radius.take(take(self.column, lanes)) + take(self.hits.t, lanes)) / size
+        more = (
+            POINT_ERROR
+            * (self._table.radius.take(take(self.column, lanes)) + take(self.hits.t, lanes))
+            / size
+        )
         if isinstance(lanes, slice):
             return there / size, error + more
         put(ng, lanes, there / size)

@@ -1,4 +1,4 @@
-"""Motions while a shutter is open: matrices that go over from one time to the next along lines or parabolas.
+"""Motions while a shutter is open: matrices that go along lines or parabolas between some times.
 
 The steps between these times are halved where a motion needs that: where it is fast, and at the keys of
 keyframes, where it has bends.
@@ -48,7 +48,9 @@ class Motions:
     first_of: Ints  # (BINS + 1,) the step at the beginning of each bin
     # (12, m * steps) for each step of each motion: the (3, 4) matrix at its beginning, row by row
     to_local: Doubles
-    slope: list[Doubles | None]  # 12 × (m * steps,) its change by a part of the step; None where there is none
+    slope: list[
+        Doubles | None
+    ]  # 12 × (m * steps,) its change by a part of the step; None where there is none
     bend: list[Doubles | None]  # 12 × (m * steps,) the same by the square of that part
     error: Doubles  # (m,) of places that steps leave out, relative to the size of what moves; jumps aside
 
@@ -80,7 +82,7 @@ class Motions:
         if fast.size:
             worst, more = int(fast[table.error[fast].argmax()]), fast.size - 1
             warn_caller(
-                f"{names[worst]}: moves too fast while the shutter is open for a table of {table.steps} steps: "
+                f"{names[worst]}: moves too fast while the shutter is open for {table.steps} steps: "
                 f"places are off by up to {table.error[worst]:.2g} of the size of what moves; "
                 f"{TOLERATED:.2g} is tolerated" + (f" (and {more} more like it)" if more else "")
             )
@@ -178,7 +180,6 @@ class Motions:
         found: list[float] = np.linspace(self.begin, self.begin + self.seconds, count).tolist()
         return found
 
-
     def times_in(self, step: Ints, count: int) -> Doubles:
         """Return times (k, count), s, evenly spaced over some steps (k,), with both ends."""
         begin, end = self.start.take(step)[:, None], self.start.take(step + 1)[:, None]
@@ -243,11 +244,12 @@ def _steps_at(
     """Return steps between parts `ends` (2, k) of the time, with matrices at `NODES` and `between`."""
     parts, (start, stop) = np.append(NODES, between), ends.reshape(2, -1)
     places = start[:, None] + (stop - start)[:, None] * parts
-    placed = np.stack([motion(begin + (end - begin) * places.ravel()) for motion in motions])
-    placed[:, :, :3, :3] = _thickened(placed[:, :, :3, :3])
+    placed = np.stack([motion(begin + (end - begin) * places.ravel()) for motion in motions])[:, :, :3]
+    placed[..., :3] = _thickened(placed[..., :3])
+    inverse = inverse_linear(placed.reshape(-1, 12).T).T.reshape(*placed.shape[:2], 3, 3)
+    to_local = np.concatenate([inverse, -inverse @ placed[..., 3:]], 3)
     shape = len(motions), start.size, parts.size, 3, 4
-    to_local = np.linalg.inv(placed)[:, :, :3].reshape(shape)
-    return _Steps(start, parts, placed[:, :, :3].reshape(shape), to_local, np.zeros(shape[:2]))
+    return _Steps(start, parts, placed.reshape(shape), to_local.reshape(shape), np.zeros(shape[:2]))
 
 
 def _bends(keys: Doubles, begin: float, end: float, most: int) -> Doubles:
@@ -283,7 +285,7 @@ def _sizes(placed: Doubles, reach: Doubles) -> Doubles:
 def _errors(steps: _Steps, reach: Doubles, size: Doubles, straight: bool) -> Doubles:
     """Return the errors (m, k) of steps, relative to the sizes (m,) of what moves.
 
-    They are of places at most `reach` (m,) from the origins of their coordinates: where the lines or parabolas
+    They are of places at most `reach` (m,) from the origins of their coordinates: where lines or parabolas
     take them that the motion has put into the scene.
     """
     before, middle, after = (steps.to_local[:, :, node] for node in range(3))
