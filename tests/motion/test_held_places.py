@@ -281,6 +281,36 @@ def test_cameras_are_where_they_are_held(name: str) -> None:
     assert_held(scene, 3e-3, max_bounces=2)
 
 
+CLEAR: dict[str, list[wf.Shape]] = {
+    "ball": [wf.Sphere((0, 0.3, 0), 0.5, material=GLASS).transformed(held(MOVED))],
+    "ball that grows": [
+        wf.Sphere((0, 0.3, 0), 0.3, material=GLASS).transformed(held(placed(1.7 * STAYS, (0.3, 0, 0))))
+    ],
+    "balls over time": [
+        wf.Spheres(
+            over_time(np.array([(-0.5, 0.3, 0), (0.6, 0.4, 0.5)]), np.array([(0, 0.5, 0), (0.8, 0.5, 0)])),
+            0.3,
+            material=GLASS,
+            times=TIMES,
+        )
+    ],
+    "box beside a ball": [
+        cube(GLASS).transformed(held(MOVED)),
+        wf.Sphere((-1, 0.3, 0), 0.4, material=GLASS),
+    ],
+    "mirror that deforms": [quad_over_time(0.6 * ABOUT_Y @ QUARTER, wf.Mirror(), two_sided=True)],
+}
+
+
+@pytest.mark.parametrize("name", slow_but({"balls over time", "box beside a ball"}, CLEAR))
+def test_paths_from_lights_begin_where_glass_is_held(name: str) -> None:
+    scene, options = wf.Scene([FLOOR, *CLEAR[name]], [LAMP], CAMERA), {"caustics": True, "max_bounces": 4}
+    assert_held(scene, **options)
+    plain = wf.render(scene.at(0.1), 4, progress=False, workers=1, max_bounces=4).rgb
+    lit = wf.render(scene.at(0.1), 4, progress=False, workers=1, **options).rgb
+    assert lit.mean() > 1.02 * plain.mean()
+
+
 def test_caustics_are_seen_from_where_the_camera_is_held() -> None:
     """Paths from lights end at the camera of their time."""
     glass = wf.Sphere((0, 0.5, 0), 0.5, material=wf.Dielectric(1.5))

@@ -22,7 +22,7 @@ from ..arrays.soa import soa
 from ..arrays.state import Hits
 from ..arrays.vec import Bools, Doubles, Floats, Ints, f4, spans
 from ..motion.shutter import Shutter
-from ..motion.steps import Matrices, Motions, inverse_linear, step_at
+from ..motion.steps import Matrices, Motions, growth_of, inverse_linear, step_at
 from ..scene import Scene
 from ..shapes import Instance, Mesh
 from ..shapes.attributes import Corners, corner_values
@@ -167,6 +167,27 @@ class MotionTable:
     lights: Motions | None = None  # of those in `motion_of_light`
     motion_of_light: dict[int, int] = field(default_factory=dict)  # by their numbers in the scene
     all_move: bool = False  # whether no instance stands still
+
+    def matrices(self, column: Ints, time: Doubles) -> Doubles:
+        """Return the matrices (12, n), from the scene, of moving shapes in columns (n,) at times (n,)."""
+        assert self.motions is not None
+        return self.motions.at(self.mover.take(column), time)
+
+    def growth(self, column: Ints) -> Doubles:
+        """Return by what areas of shapes in columns (n,) grow in the middle of the time; 1 if they stay."""
+        grown, moves = np.ones(column.size), np.flatnonzero(self.mover.take(column) >= 0)
+        times = np.full(moves.size, self.shutter.middle)
+        grown[moves] = growth_of(inverse_linear(self.matrices(column.take(moves), times)))
+        return grown
+
+    def ways(self, row: Ints, time: Doubles) -> Doubles:
+        """Return how far curved primitives (n,), by rows, are from where the tables have them, (3, n)."""
+        ways = np.zeros((3, row.size))
+        for each in self.curved:
+            if each.centers is not None:
+                some = np.flatnonzero((row >= each.first) & (row < each.first + len(each.kind)))
+                ways[:, some] = each.ways(row.take(some), time.take(some))
+        return ways
 
     def is_rigid(self, row: Ints) -> Bools:
         """Return which rows (n,) of the scene's tables are of no mesh that deforms."""

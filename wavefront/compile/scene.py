@@ -248,9 +248,19 @@ def gather_scene(
         )
     specular, groups_of = None, group_materials(user_materials)
     if caustics and len(lights) > int(environment >= 0):  # one is not at infinity
-        whole = np.append(np.arange(once), np.arange(len(triangles), len(material_of)))
+        counts = [0, 0, *(len(instance.mesh.faces) for instance in instances)]
+        counts += [len(kind) for kind in table_of_curved.kinds[still:]]
         specular = find_specular_surfaces(
-            triangles[:once], table_of_curved, still, material_of.take(whole), light_of.take(whole), groups_of
+            triangles,
+            once,
+            table_of_curved,
+            still,
+            material_of,
+            light_of,
+            groups_of,
+            counts,
+            table,
+            motion if motion is not None and motion.motions is not None else None,
         )
     groups, efficacies = numbered.groups(), numbered.efficacies()
     if media is not None:

@@ -168,13 +168,8 @@ class MovingSurfaces(InstancedSurfaces):
     def _ways(self, lanes: Ints) -> Doubles:
         """Return how far curved primitives (k,) are from where the scene's tables have them, (3, k)."""
         assert self.scene.motion is not None
-        ways, row = np.zeros((3, lanes.size)), self.hits.prim.take(lanes)
         time = times_of(self.scene, self.rays).take(lanes)
-        for each in self.scene.motion.curved:
-            if each.centers is not None:
-                some = np.flatnonzero((row >= each.first) & (row < each.first + len(each.kind)))
-                ways[:, some] = each.ways(row.take(some), time.take(some))
-        return ways
+        return self.scene.motion.ways(self.hits.prim.take(lanes), time)
 
     def _curved(self) -> Ints:
         """Return which of the lanes that move are on curved shapes, (k,)."""

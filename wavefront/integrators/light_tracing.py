@@ -121,23 +121,24 @@ def _begin(
     width, height = camera.resolution
     address = (np.uint32(width * height % 2**32) + sample).astype(np.uint32), camera.address(pixel)
     choice = sampler.draw_2d(*address, 0, Dimension.SPECULAR_SURFACE).astype(np.float64)
-    start = specular.sample(
-        choice[0] + choice[1] * LOWER_BITS, sampler.draw_2d(*address, 0, Dimension.SPECULAR_POINT)
-    )
     u_choice = sampler.draw_1d(*address, 0, Dimension.LIGHT)
-    exposure, receiver = scene.program.find(Exposure), None
+    exposure, receiver, time = scene.program.find(Exposure), None, None
     if exposure is not None:
-        receiver = _at_times(exposure.shutter.times(sampler.draw_1d(*address, 0, Dimension.TIME)))
+        time = exposure.shutter.times(sampler.draw_1d(*address, 0, Dimension.TIME))
+        receiver = _at_times(time)
+    start = specular.sample(
+        choice[0] + choice[1] * LOWER_BITS, sampler.draw_2d(*address, 0, Dimension.SPECULAR_POINT), time
+    )
     light, number = scene.lights.sample_li(
         start.point, u_choice, sampler.draw_2d(*address, 0, Dimension.LIGHT_POINT), receiver
     )
     placed = np.isfinite(light.distance) | scene.lights.delta_of.take(number)
     lanes = np.flatnonzero((light.pdf > 0) & placed)
     paths, hits = _arriving(scene, start.take(lanes), light.take(lanes), address, lanes)
-    if receiver is not None and receiver.time is not None:
-        paths.time = receiver.time.take(lanes)
+    if time is not None:
+        paths.time = time.take(lanes)
     paths, hits = compact(scene, paths, hits, np.arange(lanes.size))
-    return _lit(scene, specular, paths, hits, light, number, pixel.size)
+    return _lit(scene, specular, paths, hits, light, number, start.area)
 
 
 def _at_times(time: Doubles) -> Receiver:
@@ -178,9 +179,12 @@ def _lit(
     hits: Hits,
     light: LightSample,
     number: Ints,
-    slots: int,
+    area: Floats,
 ) -> tuple[Paths, Hits, Floats]:
-    """Return the paths that nothing blocks on the way from the light, and the flux (3, slots) of each."""
+    """Return the paths that nothing blocks on the way from the light, and the flux (3, slots) of each slot.
+
+    `area` (slots,) is the inverse of the densities of their first points.
+    """
     surface = interaction(scene, paths, hits)
     light, number = light.take(paths.slot), number.take(paths.slot)
     everything, start = np.arange(len(surface)), origin_above(surface)
@@ -190,8 +194,8 @@ def _lit(
     arriving = radiance_at_samples(scene, rays, light, everything, number)
     arriving = arriving * _transmittance(scene, rays)
     cos = dot(surface.ng, light.wi)
-    flux = np.zeros((3, slots), f4)
-    arriving = arriving * (cos * f4(specular.area) / light.pdf)
+    flux = np.zeros((3, area.size), f4)
+    arriving = arriving * (cos * area.take(paths.slot) / light.pdf)
     passage = Passage(scene, paths, surface, None, 0)
     flux[:, paths.slot] = arriving * opacities_at(passage, scene.program.see_through)
     lanes = np.flatnonzero(highest(take(flux, paths.slot)) != 0)
@@ -207,7 +211,7 @@ def _first(scene: CompiledScene, specular: SpecularSurfaces, rays: ShadowRays) -
     away, nothing = NEARBY * rays.error, broadcast(np.intp(-1), len(rays))
     back = Rays(rays.origin + rays.direction * away, -rays.direction, nothing, time=rays.time)
     hits = scene.accelerator.closest(*query(scene, back))
-    return ~((hits.t < 2 * away) & (hits.prim < specular.found_as.take(rays.exclude_prim)))
+    return ~((hits.t < 2 * away) & (hits.prim < specular.lowest(rays.exclude_prim)))
 
 
 def _transmittance(scene: CompiledScene, rays: ShadowRays, veils: Veils = ()) -> Floats:

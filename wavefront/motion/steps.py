@@ -12,7 +12,7 @@ from typing import Self
 import numpy as np
 
 from ..arrays.soa import soa
-from ..arrays.vec import Doubles, Floats, Ints
+from ..arrays.vec import Doubles, Floats, Ints, cross
 from ..core.errors import warn_caller
 
 Matrices = Callable[[Doubles], Doubles]  # from times (n,) to matrices (n, 4, 4)
@@ -351,6 +351,17 @@ def inverse_linear(matrix: Doubles) -> Doubles:
         ]
     )
     return cofactors / (a * cofactors[0] + b * cofactors[3] + c * cofactors[6])
+
+
+def linear_times(linear: Doubles, vectors: Floats | Doubles) -> Doubles:
+    """Return vectors (3, n), each by a (3, 3) matrix, given row by row, (9, n)."""
+    return np.stack([(linear[i : i + 3] * vectors).sum(0) for i in (0, 3, 6)])
+
+
+def growth_of(linear: Doubles) -> Doubles:
+    """Return by what areas grow in the mean of all directions, (n,), of (3, 3) matrices (9, n)."""
+    a, b, c = linear.reshape(3, 3, -1)
+    return np.asarray(np.abs((a * cross(b, c)).sum(0)) ** (2 / 3), np.float64)
 
 
 def step_at(times: Doubles, time: Doubles) -> tuple[Ints, Doubles]:
