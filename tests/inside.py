@@ -281,6 +281,7 @@ from wavefront.lights.textured_emission import TexturedTriangleLights, TwoSidedT
 from wavefront.lights.textured_sphere import TexturedSphereLights
 from wavefront.lights.tree import LightTreeSampler
 from wavefront.lights.triangle import FEW, TriangleLights, TwoSidedTriangleLights
+from wavefront.lights.turning import TurningLight
 from wavefront.material_ball import ball_png
 from wavefront.materials.material import Material, as_material
 from wavefront.materials.named import NAMED_MATERIALS

@@ -32,6 +32,7 @@ from inside import (
     TexturedSphereLights,
     TexturedTriangleLights,
     TriangleLights,
+    TurningLight,
     TwoSidedRectangleLights,
     TwoSidedTexturedTriangleLights,
     TwoSidedTriangleLights,
@@ -128,7 +129,8 @@ kinds = pytest.mark.parametrize("kind", LIGHTS, ids=lambda kind: kind.__name__)
 def test_every_light_is_here() -> None:
     """`GlowLights` are points in a volume, which no ray meets: their samples are in `test_glow.py`.
 
-    Lights that move are those that stand still at a time: tests/motion/test_moving_lights.py.
+    Lights that move or turn are those that stand still at a time: tests/motion/test_moving_lights.py and
+    test_turning_skies.py.
     """
     modules = [
         import_module(f"{lights.__name__}.{each.name}") for each in pkgutil.iter_modules(lights.__path__)
@@ -139,7 +141,7 @@ def test_every_light_is_here() -> None:
         for each in vars(module).values()
         if isinstance(each, type) and issubclass(each, LightRecord) and not isabstract(each)
     }
-    assert found == {*LIGHTS, GlowLights, MovingLights, DeformingLights}
+    assert found == {*LIGHTS, GlowLights, MovingLights, DeformingLights, TurningLight}
 
 
 @kinds

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 import scenes
 from inside import (
+    CHARTS,
     BsdfSample,
     ConstantEnvironment,
     Dielectric,
@@ -13,6 +14,7 @@ from inside import (
     PointLight,
     SphereLights,
     TriangleLights,
+    check_density,
     warp,
     weigh,
 )
@@ -52,6 +54,21 @@ def test_chi_square_pools_cells_below_five():
 
 def test_chi_square_rejects_what_cannot_happen():
     assert chi2.chi_square(np.array([10, 90]), np.array([0.0, 100]))[2] < 1e-3
+
+
+def test_a_small_part_of_a_density_is_integrated_if_any_sample_is_there():
+    """All points of the first quadrature miss it, and so do the first samples."""
+    rng, n, few, low, side = np.random.default_rng(1), 1 << 18, 40, [[0.2331], [0.3131]], 0.002
+
+    def density(p):
+        inside = ((p >= low) & (p < np.add(low, side))).all(0)
+        return np.where(inside, few / n / side**2, 2 * (1 - few / n) * (p[0] >= 0.5)).astype(F4)
+
+    pilot, points = (rng.random((2, count)) * [[0.5], [1]] + [[0.5], [0]] for count in (1 << 14, n))
+    points[:, -few:] = low + side * rng.random((2, few))
+    report = testing.Report("part")
+    check_density(report, "", CHARTS["square"], pilot.astype(F4), points.astype(F4), n, density, 1e-4)
+    report.raise_if_failed()
 
 
 @pytest.mark.parametrize(("count", "trials", "p"), [(480, 1000, 0.5), (3, 1000, 0.01), (0, 10, 0.3)])

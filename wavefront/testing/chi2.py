@@ -12,6 +12,9 @@ from .charts import Chart
 from .quadrature import COLUMNS, ROWS, Cells, DensityIntegrator
 from .report import Report
 
+GUIDES = 1 << 17  # samples that guide the quadrature, of all cells
+FEW = 500  # samples of a cell
+
 
 def gamma_q(a: float, x: float) -> float:
     """Return the regularized upper incomplete gamma function Q(a, x).
@@ -102,11 +105,13 @@ def check_density(
     """
     cells = Cells.around(chart.to_square(pilot), chart.seams)
     on_square = chart.to_square(points)
-    guide = points[:, : 1 << 17]
-    height = density(guide).astype(np.float64)
-    integrator = DensityIntegrator(density, chart, on_square[:, : 1 << 17], height)
+    cell = cells.find(on_square)
+    observed = np.bincount(cell, minlength=ROWS * COLUMNS)
+    # all samples of a cell that has few: a part of it that all points of the quadrature miss counts there
+    guide = np.flatnonzero((np.arange(cell.size) < GUIDES) | (observed <= FEW)[cell])
+    height = density(points.take(guide, 1)).astype(np.float64)
+    integrator = DensityIntegrator(density, chart, on_square.take(guide, 1), height)
     expected, unresolved = integrator.cells(cells)
-    observed = np.bincount(cells.find(on_square), minlength=ROWS * COLUMNS)
     integral = float(expected.sum())
     missing = total - points.shape[1]
     fraction = points.shape[1] / total
