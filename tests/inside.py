@@ -9,7 +9,7 @@ from wavefront.accel.build import build_tree, stable_order
 from wavefront.accel.capsule import CapsulePrimitives
 from wavefront.accel.counter import RayCounter
 from wavefront.accel.cylinder import CylinderPrimitives
-from wavefront.accel.deforming import DeformingAccelerator, SweptSpheres, SweptTriangles
+from wavefront.accel.deforming import DeformingAccelerator, SweptSpheres, SweptTriangles, joined_steps
 from wavefront.accel.distance_grid import DistanceGridPrimitives, _first_root
 from wavefront.accel.embree import installed
 from wavefront.accel.instances import InstanceAccelerator
@@ -18,6 +18,7 @@ from wavefront.accel.plate import Plate, PlateAccelerator, beside_plate, surely_
 from wavefront.accel.primitives import CurvedPrimitives
 from wavefront.accel.quads import are_parallelograms, corners, find_quads
 from wavefront.accel.registry import ACCELERATORS, make_accelerator
+from wavefront.accel.search import PrimitiveTree
 from wavefront.accel.sphere import SpherePrimitives
 from wavefront.arrays import elementary
 from wavefront.arrays.frame import Frame

@@ -6,9 +6,11 @@ from inside import (
     DeformingAccelerator,
     Geometry,
     NumpyAccelerator,
+    PrimitiveTree,
     SpherePrimitives,
     SweptSpheres,
     SweptTriangles,
+    joined_steps,
 )
 
 import wavefront as wf
@@ -44,7 +46,7 @@ def moving_and_still(kind):
     """What deforms, and a function from a step and a part of it to what is still."""
     if kind == "triangles":
         forms = triangles()
-        steps = [SweptTriangles(*forms[at : at + 2]) for at in range(2)]
+        steps = [SweptTriangles(forms[at : at + 2], np.array([0.0, 1.0])) for at in range(2)]
     else:
         forms, radii = spheres()
         steps = [SweptSpheres(*forms[at : at + 2], radii) for at in range(2)]
@@ -102,10 +104,62 @@ def test_edges_let_no_ray_through():
     box = wf.Box((0, 0, 0), 1)
     corners = box.vertices[box.faces].astype(np.float32)
     forms = np.stack([corners, corners * np.float32([1.3, 0.7, 1])])
-    moving = DeformingAccelerator(np.array([0.0, 1.0]), [SweptTriangles(*forms)], False)
+    moving = DeformingAccelerator(np.array([0.0, 1.0]), [SweptTriangles(forms, np.array([0.0, 1.0]))], False)
     rng = np.random.default_rng(4)
     time, face, along = rng.random(N), rng.integers(0, len(corners), N), rng.random((N, 1))
     then = forms[0][face] + (forms[1][face] - forms[0][face]) * time[:, None, None]
     origin = np.zeros((3, N), np.float32)  # within
     direction = (then[:, 0] * along + then[:, 1] * (1 - along)).T.astype(np.float32)
     assert np.isfinite(moving.at(time).closest(origin, direction, np.full(N, -1)).t).all()
+
+
+def bent(off):
+    """A sheet of triangles at three times, with corners up to `off` edges beside lines between the ends."""
+    first, last = triangles()[:2]
+    edge = np.linalg.norm(first[:, 1] - first[:, 0], axis=1).mean()
+    wave = np.sin(40 * first[..., [1, 2, 0]]) * off * edge
+    return [first, (0.6 * first + 0.4 * last + wave).astype(np.float32), last]
+
+
+def test_steps_along_lines_are_joined():
+    times = np.array([0, 0.4, 1])
+    for off, joined in ((0, True), (0.03, True), (1, False)):
+        ends, steps = joined_steps(times, bent(off))
+        assert (ends.tolist(), len(steps)) == (([0, 1], 1) if joined else ([0, 0.4, 1], 2))
+
+
+@pytest.mark.parametrize("off", [0.03, 1])
+def test_rays_meet_what_is_beside_lines(off):
+    rng, times, forms = np.random.default_rng(6), np.array([0, 0.4, 1]), bent(off)
+    moving = DeformingAccelerator(*joined_steps(times, forms), True)
+    for time in (0.2, 0.4, 0.55):
+        origin, direction, nothing = rays(rng)
+        found = moving.at(np.full(N, time)).closest(origin, direction, nothing)
+        before, after, part = (*forms[:2], time / 0.4) if time < 0.4 else (*forms[1:], (time - 0.4) / 0.6)
+        then = before + (after.astype(float) - before) * part
+        expected = NumpyAccelerator(Geometry(then.astype(np.float32))).closest(origin, direction, nothing)
+        met = (found.prim == expected.prim) & (found.prim >= 0)
+        assert (found.prim == expected.prim).mean() > 0.999
+        np.testing.assert_allclose(found.t[met], expected.t[met], rtol=1e-5)
+
+
+def test_what_goes_far_costs_few_tests(monkeypatch):
+    """The boxes of its tree go along: rays come to hardly more leaves than where it stands still."""
+    u, v = np.meshgrid(np.linspace(-1, 1, 120), np.linspace(-1, 1, 120), indexing="ij")
+    sheet = np.stack([u, v, 0.1 * np.sin(9 * u) * np.sin(8 * v)], -1)
+    still = np.stack([sheet[:-1, :-1], sheet[1:, :-1], sheet[:-1, 1:]], 2).reshape(-1, 3, 3)
+    forms = [np.float32(still * (1, 1 - d, 1) + (2 * d, 0, 0)) for d in (-0.3, 0.3)]
+    visits, visit = [], PrimitiveTree._visit
+
+    def counted(tree, n, features, tests, leaf, lane):
+        visits.append(leaf.size)
+        visit(tree, n, features, tests, leaf, lane)
+
+    monkeypatch.setattr(PrimitiveTree, "_visit", counted)
+    origin, direction, nothing = rays(np.random.default_rng(7))
+    NumpyAccelerator(Geometry(np.float32(still))).closest(origin, direction, nothing)
+    once = sum(visits)
+    visits.clear()
+    moving = DeformingAccelerator(*joined_steps(np.array([0.0, 1.0]), forms), True)
+    moving.at(np.full(N, 0.5)).closest(origin, direction, nothing)
+    assert 0.3 * once < sum(visits) < 1.5 * once

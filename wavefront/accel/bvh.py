@@ -379,7 +379,11 @@ def quadric_rows(shape: Doubles, center: Doubles, radius: Doubles) -> Floats:
 
 
 def trace(
-    tree: Bvh, batch: RayBatch, t_far_now: Callable[[], Floats], visit: Callable[[Ints, Ints], None]
+    tree: Bvh,
+    batch: RayBatch,
+    t_far_now: Callable[[], Floats],
+    visit: Callable[[Ints, Ints], None],
+    boxes: MovingBoxes | None = None,
 ) -> None:
     """Traverse the tree, near children of the root first.
 
@@ -393,9 +397,11 @@ def trace(
         of the ball's radius.
     visit
         Tests pairs of leaves (k,) and lanes (k,).
+    boxes
+        Those of children that move, in place of the tree's.
     """
     t_far = t_far_now()
-    rays = _lines(batch, tree.scale)
+    rays = _lines(batch, tree.scale, boxes)
     codes = tree.child.take(tree.top)
     slot, lane, near = _root_pairs(tree, rays, t_far)
     for last in (*[False] * NEAR_ROUNDS, True):
@@ -411,6 +417,14 @@ def trace(
 
 
 @soa
+class MovingBoxes:
+    """Boxes of the children of a tree that go from one place to another, and parts of their way for rays."""
+
+    change: Floats  # (6, nodes * width) from the tree's boxes, which are those at the beginning, to the end
+    part: Floats  # (n + 1,) of the way that is over at the times of n rays
+
+
+@soa
 class _Lines:
     """The lines of n rays in units of the ball's radius, about its center, and one that meets nothing."""
 
@@ -418,20 +432,26 @@ class _Lines:
     foot: Floats  # (3, n + 1) point of the line nearest to the center; distances count from it
     inverse: Floats  # (3, n + 1) 1 / direction
     begin: Floats  # (n + 1,) distances of the origins
+    boxes: MovingBoxes | None  # where the boxes move
 
     def span(self, box: Floats, slot: Ints, lane: Ints) -> tuple[Floats, Floats]:
         """Return the entry and exit distances of lanes (k,) at boxes `slot` (k,) of `box` (6, slots)."""
         enter, leave = self.begin.take(lane), np.full(lane.size, np.inf, f4)
+        part = None if self.boxes is None else self.boxes.part.take(lane)
         for axis in range(3):
             foot, inverse = self.foot[axis].take(lane), self.inverse[axis].take(lane)
-            first = (box[axis].take(slot) - foot) * inverse
-            second = (box[axis + 3].take(slot) - foot) * inverse
+            low, high = box[axis].take(slot), box[axis + 3].take(slot)
+            if part is not None and self.boxes is not None:
+                low += self.boxes.change[axis].take(slot) * part
+                high += self.boxes.change[axis + 3].take(slot) * part
+            first = (low - foot) * inverse
+            second = (high - foot) * inverse
             np.maximum(enter, np.minimum(first, second), out=enter)
             np.minimum(leave, np.maximum(first, second), out=leave)
         return enter, leave
 
 
-def _lines(batch: RayBatch, scale: np.float32) -> _Lines:
+def _lines(batch: RayBatch, scale: np.float32, boxes: MovingBoxes | None) -> _Lines:
     line = batch.line.copy()
     line[3:] *= scale
     dx, dy, dz, mx, my, mz = line
@@ -439,7 +459,7 @@ def _lines(batch: RayBatch, scale: np.float32) -> _Lines:
     inverse = f4(1) / np.where(line[:3] == 0, TINY, line[:3])  # 0 times the inverse must not be NaN
     begin = batch.begin * scale
     begin = np.append((begin - np.abs(begin) * 1e-6 - 1e-6).astype(f4), f4(np.inf))
-    return _Lines(line, foot, inverse, begin)
+    return _Lines(line, foot, inverse, begin, boxes)
 
 
 def _nearest_of_each(lane: Ints, near: Floats, count: int) -> Ints:
@@ -454,9 +474,8 @@ def _nearest_of_each(lane: Ints, near: Floats, count: int) -> Ints:
 
 def _root_pairs(tree: Bvh, rays: _Lines, t_far: Floats) -> tuple[Ints, Ints, Floats]:
     """Return child, lane and entry distance of the pairs of ray and root's child that meet."""
-    n, width = rays.begin.size - 1, tree.top.size
-    step = max(256, CHUNK // width)
-    box = tree.box.take(tree.top, 1)
+    n, width, moving = rays.begin.size - 1, tree.top.size, rays.boxes is not None
+    step, box = max(256, CHUNK // width), tree.box if moving else tree.box.take(tree.top, 1)
     parts = []
     for at in range(0, n, step):
         k = min(n - at, step)
@@ -466,7 +485,7 @@ def _root_pairs(tree: Bvh, rays: _Lines, t_far: Floats) -> tuple[Ints, Ints, Flo
         hit = flat_true(np.greater_equal(value, 0, out=scratch("mask", value.shape, np.bool_)))
         slot, lane = np.divmod(hit, k)
         lane += at
-        near, far = rays.span(box, slot, lane)
+        near, far = rays.span(box, tree.top.take(slot) if moving else slot, lane)
         met = np.flatnonzero(near <= np.minimum(far, t_far.take(lane)))
         parts.append((slot.take(met), lane.take(met), near.take(met)))
     if not parts:

@@ -1,7 +1,8 @@
-"""Ray queries of what deforms: corners and centers go from one place to another, linearly in time.
+"""Ray queries of what deforms: corners and centers go from one place to another, nearly along lines.
 
-The tree bounds all places of its primitives, by ellipsoids around the places at both ends. What the filter of
-still primitives multiplies by the numbers of a ray, such as the Plücker coordinates of edges, are polynomials
+The boxes of the tree go along with its primitives: those of a node are found at the beginning and the end of
+the way, and interpolated for each ray. Ellipsoids hold all places of primitives. What the filter of still
+primitives multiplies by the numbers of a ray, such as the Plücker coordinates of edges, are polynomials
 of degree two in time here. So this filter is one matrix product, too: of rows with the Bernstein coefficients
 of these polynomials, and of the ray's numbers times the Bernstein polynomials at its time. What it does not
 rule out is tested in float64, where it is at the time of the ray.
@@ -10,7 +11,7 @@ rule out is tested in float64, where it is at the time of the ray.
 from __future__ import annotations
 
 from abc import abstractmethod
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from functools import partial
 from typing import Any, ClassVar
 
@@ -21,7 +22,7 @@ from ..arrays.vec import Bools, Doubles, Floats, Ints, Lanes, cross, dot, f4
 from ..motion.steps import step_at
 from . import triangle
 from .base import Accelerator, Intersections
-from .bvh import Ball, RayBatch, bounding_ball, prepare
+from .bvh import BLOCK, BOX_MARGIN, Ball, MovingBoxes, RayBatch, bounding_ball, prepare, trace
 from .hits import AnyHit, Candidates, ClosestHit, HitAccumulator, unpack_prim, unpack_t
 from .numpy_accel import batch_size, leaf_size_for
 from .primitives import Primitives
@@ -29,9 +30,12 @@ from .search import PrimitiveTree
 from .sphere import line_features, sphere_distance, sphere_rows
 from .triangle import ROUNDOFF
 
+MARGIN = 1.25 * BOX_MARGIN  # added to boxes that move, which are rounded once more
+NEARLY = 0.05  # edges by which corners may be beside lines on average: more pairs need exact tests then
+
 
 class Swept(Primitives):
-    """Primitives that move from one place to another, each point along a line."""
+    """Primitives that move from one place to another, each point nearly along a line."""
 
     triangular: ClassVar[bool] = False  # whether hits have barycentric weights
     part: Doubles | None  # (n,) of the way that is over at the times of n rays
@@ -42,14 +46,21 @@ class Swept(Primitives):
         points = self.hull()
         return points.min(0), points.max(0)
 
-    def over_time(self, numbers: Floats) -> Floats:
-        """Return numbers (c, n) of lines, times the Bernstein polynomials, (3 c, n)."""
+    @abstractmethod
+    def ends(self) -> tuple[Floats, Floats, Floats, Floats]:
+        """Return the corners (3, m) of boxes: lower and upper at the beginning, and the same at the end.
+
+        Each primitive is always in the box that goes from one to the other along lines.
+        """
+
+    def with_weights(self, numbers: Floats) -> Floats:
+        """Return numbers (c, n) of lines, and the Bernstein polynomials at their times, (c + 3, n)."""
         assert self.part is not None
         part = np.zeros(numbers.shape[1])  # a last line meets nothing
         part[: self.part.size] = self.part
         left = 1 - part
-        weights = left * left, 2 * left * part, part * part
-        return np.concatenate([numbers * weight.astype(f4) for weight in weights])
+        weights = np.stack([left * left, 2 * left * part, part * part])
+        return np.concatenate([numbers, weights.astype(f4)])
 
     @abstractmethod
     def at(self, part: Doubles) -> Swept:
@@ -58,37 +69,54 @@ class Swept(Primitives):
 
 @soa
 class SweptTriangles(Swept):
-    """m triangles that move from one place to another, each corner along a line."""
+    """m triangles that move from one place to another, each corner nearly along a line."""
 
     rows = 3
     triangular = True
 
-    first: Floats  # (m, 3, 3) corners at the beginning: triangle, corner, xyz
-    last: Floats  # (m, 3, 3) at the end
+    forms: Floats  # (k + 1, m, 3, 3) corners at some times, between which they go along lines
+    times: Doubles  # (k + 1,) as parts of the way, from 0 to 1
     part: Doubles | None = None  # (n,) of the way that is over at the times of n rays
+    step: Ints | None = None  # (n,) between which times that is
+    fraction: Doubles | None = None  # (n,) after what part of the way between these
 
     def __len__(self) -> int:
         """Return the number of triangles."""
-        return len(self.first)
+        return self.forms.shape[1]
 
     def take(self, index: Lanes) -> SweptTriangles:
         """Return some of the triangles."""
-        if isinstance(index, slice):
-            return SweptTriangles(self.first[index], self.last[index])
-        return SweptTriangles(self.first.take(index, 0), self.last.take(index, 0))
+        forms = self.forms[:, index] if isinstance(index, slice) else self.forms.take(index, 1)
+        return SweptTriangles(forms, self.times)
 
     def hull(self) -> Floats:
-        """Return the corners at both ends, (6, 3, m)."""
-        ends = np.concatenate([self.first, self.last], 1)
-        return np.ascontiguousarray(ends.transpose(1, 2, 0))
+        """Return the corners at all times, (3 k + 3, 3, m)."""
+        points = self.forms.transpose(0, 2, 3, 1).reshape(-1, 3, len(self))
+        return np.ascontiguousarray(points)
+
+    def off_lines(self) -> Doubles:
+        """Return how far corners are from lines between both ends at most, (corner, xyz, m)."""
+        first, last = (self.forms[at].astype(np.float64) for at in (0, -1))
+        off = np.zeros(first.shape)
+        for form, time in zip(self.forms[1:-1], self.times[1:-1].tolist(), strict=True):
+            np.maximum(off, np.abs(form - (first + (last - first) * time)), out=off)
+        return off.transpose(1, 2, 0)
+
+    def ends(self) -> tuple[Floats, Floats, Floats, Floats]:
+        """Return boxes at both ends, see `Swept.ends`."""
+        room, first, last = self.off_lines().max(0).astype(f4), self.forms[0], self.forms[-1]
+        boxes = [(form.min(1).T - room, form.max(1).T + room) for form in (first, last)]
+        return *boxes[0], *boxes[1]
 
     def filter_rows(self, ball: Ball) -> Floats:
         """Return the Bernstein coefficients of the Plücker rows of the edges, (3, m, 18)."""
-        return swept_edge_rows(self.first.transpose(1, 0, 2), self.last.transpose(1, 0, 2), ball)
+        first, last = (self.forms[at].transpose(1, 0, 2) for at in (0, -1))
+        off = np.sqrt((self.off_lines() ** 2).sum(1)).max(0)
+        return swept_edge_rows(first, last, ball, off)
 
     def features(self, line: Floats, ball: Ball) -> Floats:
-        """Return the Plücker coordinates (6, n) of lines times the Bernstein polynomials, (18, n)."""
-        return self.over_time(line)
+        """Return the Plücker coordinates (6, n) of lines, and the Bernstein polynomials, (9, n)."""
+        return self.with_weights(line)
 
     def values(self, products: Floats, out: Floats) -> Floats:
         """Return the least products of two edge functions: above 1 where a line certainly hits."""
@@ -100,12 +128,42 @@ class SweptTriangles(Swept):
 
     def at(self, part: Doubles) -> SweptTriangles:
         """Return the triangles for rays after parts (n,) of the way."""
-        return SweptTriangles(self.first, self.last, part)
+        step, fraction = step_at(self.times, part)
+        return SweptTriangles(self.forms, self.times, part, step, fraction)
 
     def corners(self, prim: Ints, lane: Ints) -> Doubles:
         """Return the corners of triangles (k,) at the times of rays (k,): (corner, axis, k)."""
-        assert self.part is not None
-        return corners_between(self.first.take(prim, 0), self.last.take(prim, 0), self.part.take(lane))
+        assert self.step is not None
+        assert self.fraction is not None
+        rows, corners = self.step.take(lane) * len(self) + prim, self.forms.reshape(-1, 3, 3)
+        ends = corners.take(rows, 0), corners.take(rows + len(self), 0)
+        return corners_between(*ends, self.fraction.take(lane))
+
+
+def joined_steps(times: Doubles, forms: Sequence[Floats]) -> tuple[Doubles, list[SweptTriangles]]:
+    """Return steps (k,) in which corners go nearly along lines, and the times (k + 1,) between these.
+
+    Parameters
+    ----------
+    times
+        (n,) s, between which they go along lines.
+    forms
+        The corners (m, 3, 3) of triangles at these times.
+    """
+    first = forms[0].astype(np.float64)
+    edge = np.sqrt(((first - np.roll(first, 1, 1)) ** 2).sum(2)).mean()
+    ends, found, stack = [times[0]], list[SweptTriangles](), [(0, times.size - 1)]
+    while stack:
+        begin, end = stack.pop()
+        parts = (times[begin : end + 1] - times[begin]) / (times[end] - times[begin])
+        step = SweptTriangles(np.stack(forms[begin : end + 1]), parts)
+        if end > begin + 1 and np.sqrt((step.off_lines() ** 2).sum(1)).mean() > NEARLY * edge:
+            middle = (begin + end) // 2
+            stack += [(middle, end), (begin, middle)]
+        else:
+            found.append(step)
+            ends.append(times[end])
+    return np.array(ends), found
 
 
 def corners_between(first: Floats, last: Floats, part: Doubles) -> Doubles:
@@ -114,11 +172,13 @@ def corners_between(first: Floats, last: Floats, part: Doubles) -> Doubles:
     return begin + (triangle.vertices(last) - begin) * part
 
 
-def swept_edge_rows(first: Floats, last: Floats, ball: Ball) -> Floats:
+def swept_edge_rows(first: Floats, last: Floats, ball: Ball, off: Doubles) -> Floats:
     """Return the rows (3, m, 18) of the edges of triangles that move, corners (3, m, 3) at both ends.
 
     As `triangle.edge_rows`; the bounds of errors and areas hold at all times. Each sum has 18 terms in
-    place of 6, whose factors are rounded twice more.
+    place of 6, whose factors are rounded twice more. Corners are up to `off` (m,) beside the lines between
+    both ends: where a line meets a triangle, its edge functions are off by that times the two sides from
+    there to the ends of the edge.
     """
     begin, end = (corners.astype(np.float64) - ball.center for corners in (first, last))
     begin_next, end_next = np.roll(begin, -1, 0), np.roll(end, -1, 0)
@@ -130,6 +190,7 @@ def swept_edge_rows(first: Floats, last: Floats, ball: Ball) -> Floats:
     spans = begin_next - begin, (begin_next - begin + end_next - end) / 2, end_next - end
     moment, span = (np.max([np.linalg.norm(each, axis=2) for each in of], 0) for of in (moments, spans))
     error = ROUNDOFF * (36 * moment + 120 * ball.radius * span).max(0)
+    error += 2 * off * (span.max(0) + 2 * off)
     with np.errstate(all="ignore"):
         scale = 1 / np.sqrt(error * (_twice_largest_area(begin, end) + 3 * error))
     rows = [np.concatenate(pair, 2) for pair in zip(moments, spans, strict=True)]
@@ -204,6 +265,59 @@ def weights_on(corners: Doubles, point: Doubles) -> tuple[Floats, Floats]:
     return second, np.minimum(third, 1 - second)
 
 
+class SweptTree(PrimitiveTree):
+    """A tree whose boxes move with its primitives."""
+
+    def __init__(self, primitives: Swept, ids: Ints, ball: Ball, first: int, leaf_size: int) -> None:
+        super().__init__(primitives, ids, ball, first, leaf_size)
+        ends = [corners.take(ids, 1) for corners in primitives.ends()]
+        begin, end = (self._boxes(*ends[side : side + 2]) for side in (0, 2))
+        self.tree.box, self._change = begin, end - begin
+
+    def _boxes(self, low: Floats, high: Floats) -> Floats:
+        """Return the boxes (6, nodes * width) of all children, from those of primitives (3, m)."""
+        tree, ball = self.tree, self._ball
+        nothing = np.full((6, 1), np.inf)
+        least = np.concatenate([np.concatenate([low, -high]), nothing], 1)
+        leaf = least[:, tree.prim].reshape(6, -1, tree.leaf_size).min(2)
+        box, child = np.zeros((6, tree.child.size)), tree.child.reshape(-1, tree.width)
+        on_leaf = np.flatnonzero(tree.child < 0)
+        box[:, on_leaf] = leaf[:, -1 - tree.child[on_leaf]]
+        absent = tree.child == 0
+        box[:, absent] = np.inf
+        levels, level = list[Ints](), np.zeros(1, np.intp)
+        while level.size:
+            slots = np.flatnonzero(child[level] > 0)
+            slots = level.take(slots // tree.width) * tree.width + slots % tree.width
+            levels.append(slots)
+            level = tree.child.take(slots)
+        for slots in reversed(levels):
+            box[:, slots] = box.reshape(6, -1, tree.width)[:, tree.child.take(slots)].min(2)
+        box[:, absent] = 0
+        box[3:] *= -1
+        box = (box - np.tile(ball.center, 2)[:, None]) / ball.radius
+        box += np.repeat([-MARGIN, MARGIN], 3)[:, None]
+        return box.astype(f4)
+
+    def _trace(
+        self, batch: RayBatch, accumulator: HitAccumulator, visit: Callable[[Ints, Ints], None]
+    ) -> None:
+        assert isinstance(self._primitives, Swept)
+        assert self._primitives.part is not None
+        part = np.append(self._primitives.part, 0).astype(f4)
+        trace(self.tree, batch, accumulator.t_far, visit, MovingBoxes(self._change, part))
+
+    def _gather(self, features: Floats, lanes: Ints, out: Floats) -> None:
+        """Write the products of numbers of lines and Bernstein polynomials, see `PrimitiveTree._gather`."""
+        count = out.shape[1] // 3
+        for row in range(count):
+            out[:, row] = features[row].take(lanes).reshape(-1, BLOCK)
+        first, second, third = (features[count + row].take(lanes).reshape(-1, 1, BLOCK) for row in range(3))
+        np.multiply(out[:, :count], second, out=out[:, count : 2 * count])
+        np.multiply(out[:, :count], third, out=out[:, 2 * count :])
+        out[:, :count] *= first
+
+
 class SweptAccelerator:
     """Primitives that move once from one place to another; rays come after parts of their way."""
 
@@ -214,7 +328,7 @@ class SweptAccelerator:
         self._primitives, ids = primitives, np.arange(len(primitives))
         self._ball = bounding_ball(*primitives.bounds)
         with np.errstate(all="ignore"):
-            self._tree = PrimitiveTree(primitives, ids, self._ball, 0, leaf_size_for(ids.size))
+            self._tree = SweptTree(primitives, ids, self._ball, 0, leaf_size_for(ids.size))
         self._batch = batch_size(len(self._tree.tree.leaves))
 
     def closest(self, origin: Floats, direction: Floats, exclude_prim: Ints, part: Doubles) -> Intersections:
@@ -287,6 +401,11 @@ class SweptSpheres(Swept):
         sides = np.stack(np.meshgrid(*[[-1, 1]] * 3), -1).reshape(8, 3, 1).astype(f4) * self.radii
         return np.concatenate([self.first + sides, self.last + sides])
 
+    def ends(self) -> tuple[Floats, Floats, Floats, Floats]:
+        """Return boxes at both ends, see `Swept.ends`."""
+        radii, first, last = self.radii, self.first, self.last
+        return first - radii, first + radii, last - radii, last + radii
+
     def filter_rows(self, ball: Ball) -> Floats:
         """Return the Bernstein coefficients of the rows of `sphere_rows`, (1, k, 33)."""
         begin, end = self.first.astype(np.float64), self.last.astype(np.float64)
@@ -296,8 +415,8 @@ class SweptSpheres(Swept):
         return np.concatenate([rows[0], between, rows[2]], 1)[None] / f4(3)  # errors of three times the terms
 
     def features(self, line: Floats, ball: Ball) -> Floats:
-        """Return the numbers of lines times the Bernstein polynomials, (33, n)."""
-        return self.over_time(line_features(line[:3], line[3:]))
+        """Return the numbers of lines, and the Bernstein polynomials, (14, n)."""
+        return self.with_weights(line_features(line[:3], line[3:]))
 
     def tests(self, batch: RayBatch, found: HitAccumulator, first: int) -> SphereTests:
         """Return the exact tests of a batch."""

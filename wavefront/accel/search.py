@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from copy import copy
 from functools import partial
 from typing import Self
@@ -79,8 +80,19 @@ class PrimitiveTree:
         """Add all hits to `accumulator`."""
         tests = self._primitives.tests(batch, accumulator, self._first)
         features = self._primitives.features(batch.line, self._ball)
-        trace(self.tree, batch, accumulator.t_far, partial(self._visit, batch.count, features, tests))
+        self._trace(batch, accumulator, partial(self._visit, batch.count, features, tests))
         tests.finish()
+
+    def _trace(
+        self, batch: RayBatch, accumulator: HitAccumulator, visit: Callable[[Ints, Ints], None]
+    ) -> None:
+        """Traverse the tree, and have `visit` test pairs of leaf and lane."""
+        trace(self.tree, batch, accumulator.t_far, visit)
+
+    def _gather(self, features: Floats, lanes: Ints, out: Floats) -> None:
+        """Write the features of lanes (blocks * BLOCK,) to `out` (blocks, columns, BLOCK)."""
+        for row in range(out.shape[1]):
+            out[:, row] = features[row].take(lanes).reshape(-1, BLOCK)
 
     def find_blocked(self, batch: RayBatch, accumulator: AnyHit) -> None:
         """Mark the blocked lanes in `accumulator`."""
@@ -92,7 +104,7 @@ class PrimitiveTree:
 
     def _visit(self, n: int, features: Floats, tests: PrimitiveTests, leaf: Ints, lane: Ints) -> None:
         """Test pairs of leaf and lane, and pass the candidates to `tests`."""
-        size, rows, columns = self.tree.leaf_size, self._primitives.rows, len(features)
+        size, rows, columns = self.tree.leaf_size, self._primitives.rows, self.tree.leaves.shape[2]
         leaves, block_lanes = blocks(leaf, lane, n)
 
         def add_candidates(at: Ints, value: Floats) -> None:
@@ -111,8 +123,7 @@ class PrimitiveTree:
             matrices = np.take(self.tree.leaves, chosen, 0, scratch("leaves", (*shape[:2], columns)), "clip")
             chunk = block_lanes[start * BLOCK : (start + chosen.size) * BLOCK]
             rays = scratch("rays", (chosen.size, columns, BLOCK))
-            for row in range(columns):
-                rays[:, row] = features[row].take(chunk).reshape(-1, BLOCK)
+            self._gather(features, chunk, rays)
             products = np.matmul(matrices, rays, out=scratch("product", shape))
             value = self._primitives.values(
                 products.reshape(-1, rows, size, BLOCK), scratch("value", (chosen.size, size, BLOCK))

@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 
 from ..accel import Accelerator, CurvedPrimitives, Geometry, InstanceAccelerator, Placements
-from ..accel.deforming import DeformingAccelerator, SweptSpheres, SweptTriangles
+from ..accel.deforming import DeformingAccelerator, SweptSpheres, joined_steps
 from ..accel.moving import MovingInstances
 from ..accel.sphere import SpherePrimitives
 from ..arrays.soa import soa
@@ -31,8 +31,6 @@ from .geometry import compute_corner_normals, compute_face_normals
 BOX_ROOM = 2.0**-17  # margin of boxes of moving shapes, relative to their size
 BOX_TIMES = 9  # of each step of a motion, at which its box is found
 BOXES_AT_ONCE = 1 << 12  # steps
-FAST = 4.0  # edges that corners of a deforming mesh may go within a step
-MOST_PARTS = 4  # into which such a step is divided
 IDENTITY = np.eye(4)
 
 
@@ -81,9 +79,9 @@ class DeformingRows:
         """One past the row of its last triangle."""
         return self.first + len(self.corners[0])
 
-    def swept(self) -> list[SweptTriangles]:
-        """Return the triangles, step by step."""
-        return [SweptTriangles(first, last) for first, last in pairwise(self.corners)]
+    def accelerator(self, weights: bool) -> DeformingAccelerator:
+        """Return the accelerator, with barycentric weights if these are needed."""
+        return DeformingAccelerator(*joined_steps(self.times, self.corners), weights)
 
     @property
     def box(self) -> tuple[Doubles, Doubles]:
@@ -230,7 +228,7 @@ def deforming_rows(
     vectors
         Attributes along the surface that materials read.
     """
-    times = _steps_of(mesh, keys, shutter)
+    times = _times_of(keys, shutter)
     middle = still.bounds.mean(0)
     meshes = [mesh.at(time) for time in times.tolist()]
     fractions = (times - shutter.middle) / (shutter.end - shutter.begin)
@@ -253,27 +251,6 @@ def _times_of(keys: Doubles, shutter: Shutter) -> Doubles:
     """Return keys (n,) s while a shutter is open, and when it opens and closes."""
     inside = keys[(keys > shutter.begin) & (keys < shutter.end)]
     return np.concatenate([[shutter.begin], inside, [shutter.end]])
-
-
-def _steps_of(mesh: Mesh, keys: Doubles, shutter: Shutter) -> Doubles:
-    """Return the times between which a mesh is traced as if its corners went along lines."""
-    times = _times_of(keys, shutter)
-    parts = [_parts_of(mesh, *step) for step in pairwise(times)]
-    steps = [
-        np.linspace(begin, end, count, endpoint=False)
-        for (begin, end), count in zip(pairwise(times), parts, strict=True)
-    ]
-    return np.concatenate([*steps, times[-1:]])
-
-
-def _parts_of(mesh: Mesh, begin: float, end: float) -> int:
-    """Return into how many parts a step is divided, so that boxes of triangles do not become too large."""
-    before, after = mesh.at(begin).vertices, mesh.at(end).vertices
-    way = after - before
-    way = np.linalg.norm(way - way.mean(0), axis=1).mean()
-    a, b, _ = before.take(mesh.faces, 0).transpose(1, 0, 2)
-    edge = np.linalg.norm(b - a, axis=1).mean()
-    return int(np.clip(np.ceil(way / max(FAST * edge, 1e-300)), 1, MOST_PARTS))
 
 
 def motion_table(
@@ -517,8 +494,7 @@ def place_accelerators(
     row, meshes = first_row, list[Any]()
     for corners in triangles:
         if row in deforming:
-            deformation = deforming[row]
-            meshes.append(DeformingAccelerator(deformation.times, deformation.swept(), weights))
+            meshes.append(deforming[row].accelerator(weights))
         else:
             meshes.append(make_accelerator(Geometry(corners, (), weights)))
         row += len(corners)
