@@ -306,7 +306,7 @@ TRIANGLE_CASES = [
         spp=16384,
         naive_spp=32768,
         max_error=0.001,
-        later=ALL[number % 2 :: 2],
+        later=("naive", *ALL[number % 2 :: 2]),
     )
     for number, (expected, corners) in enumerate(NORI_TRIANGLES, 1)
 ]

@@ -5,7 +5,7 @@ from __future__ import annotations
 import subprocess
 import sys
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager, suppress
 from pathlib import Path
 
@@ -32,6 +32,15 @@ def left():
     return [each.name for each in threading.enumerate()[1:]] + multiprocessing.active_children()
 """
 ENDLESS = "wf.render(closed, 64, workers=2, executor={executor!r}, max_bounces=65536, progress={progress})"
+
+
+def write_mesh(path: Path, corners: Sequence[Sequence[float]], faces: Sequence[Sequence[int]]) -> None:
+    """Write triangles as PLY: to read OBJ, programs import trimesh, which takes most of a second."""
+    lines = ["ply", "format ascii 1.0", f"element vertex {len(corners)}"]
+    lines += [f"property float {name}" for name in "xyz"]
+    lines += [f"element face {len(faces)}", "property list uchar int vertex_indices", "end_header"]
+    lines += [" ".join(map(str, row)) for row in (*corners, *((3, *face) for face in faces))]
+    path.write_text("\n".join(lines) + "\n")
 
 
 def start_python(*arguments: str) -> subprocess.Popen[str]:

@@ -1,5 +1,7 @@
 """The standard skies by their closed formula, and a quadrature of the sky, beside what `wf.Sky` has."""
 
+from functools import cache
+
 import numpy as np
 
 # ISO 15469:2004, table 1
@@ -33,9 +35,15 @@ def standard(type: int, sun: np.ndarray, directions: np.ndarray) -> np.ndarray:
     return (1 + a * np.exp(b / cos_z)) * scattered
 
 
+@cache
+def gauss_rule(count: int) -> tuple[np.ndarray, np.ndarray]:
+    """Nodes and weights of Gauss's rule on [-1, 1]."""
+    return np.polynomial.legendre.leggauss(count)
+
+
 def dome(rows: int = 96, columns: int = 192) -> tuple[np.ndarray, np.ndarray]:
     """Directions (rows, columns, 3), and their cos·dω: Gauss's rule in sin²Z."""
-    x, w = np.polynomial.legendre.leggauss(rows)
+    x, w = gauss_rule(rows)
     sin2 = (x + 1) / 2  # cos Z·sin Z·dZ = d(sin²Z)/2
     azimuth = (np.arange(columns) + 0.5) / columns * 2 * np.pi
     level = np.sqrt(sin2)[:, None]

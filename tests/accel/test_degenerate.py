@@ -113,7 +113,7 @@ def test_given_arrays_are_left_alone():
 @pytest.mark.parametrize("material", MATERIALS.values(), ids=MATERIALS)
 def test_tiny_shapes_alone_and_beside_large_ones(material):
     large = quad(material, PLACES * 3 - 1, normals=UP)
-    for size in (1e-3, 1e-8, 1e-12, 1e-20, 1e-30):
+    for size in (1e-3, 1e-12, 1e-30):
         check(quad(material, PLACES * size, normals=UP), size=size)
         check(quad(material, PLACES * size, normals=UP), large)
         check(wf.Sphere((0.4, 0.4, 0.05), size, material=material), large)

@@ -24,6 +24,7 @@ from inside import (
     ThinDielectric,
     ThinDisney,
 )
+from near import assert_near
 
 from wavefront import bsdfs, testing
 
@@ -202,7 +203,7 @@ def test_every_material_is_public():
 def two_of_each_kind() -> Iterator[object]:
     """Yield all cases; the second of a kind at one angle, and slow with those after it at all."""
     seen: Counter[type] = Counter()
-    every, slow = (0.0, 60.0, 89.0), [pytest.mark.slow]
+    every, slow = (0.0, 89.0), [pytest.mark.slow]
     for (kind, arguments), name in zip(CASES, NAMES, strict=True):
         seen[kind] += 1
         if seen[kind] == 2:
@@ -217,9 +218,10 @@ def test_contract(kind, arguments, angles):
     testing.check_bsdf(kind(**arguments), samples=40_000, angles=angles, reciprocal=reciprocal)
 
 
+@pytest.mark.parametrize("angles", [(60.0,), pytest.param((0.0, 89.0), marks=pytest.mark.slow)], ids=str)
 @pytest.mark.parametrize("bsdf", LOSSLESS, ids=lambda b: type(b).__name__)
-def test_nothing_is_lost(bsdf):
-    testing.check_bsdf(bsdf, samples=40_000, angles=(0.0, 60.0, 89.0), albedo=(1, 1))
+def test_nothing_is_lost(bsdf, angles):
+    testing.check_bsdf(bsdf, samples=40_000, angles=angles, albedo=(1, 1))
 
 
 def test_only_diffuse_is_matte():
@@ -246,11 +248,11 @@ def test_textures_of_one_value_equal_the_value(kind, arguments):
         a, b = plain.bind(surface(wo, back_facing)), textured.bind(surface(wo, back_facing))
         if plain.specular and "roughness" in arguments:
             continue  # a texture of roughness 0 is raised to a very sharp lobe
-        assert a.f(wo, wi) == pytest.approx(b.f(wo, wi), rel=1e-5)
-        assert a.pdf(wo, wi) == pytest.approx(b.pdf(wo, wi), rel=1e-5)
+        assert_near(a.f(wo, wi), b.f(wo, wi), rel=1e-5)
+        assert_near(a.pdf(wo, wi), b.pdf(wo, wi), rel=1e-5)
         one, two = a.sample_f(wo, u), b.sample_f(wo, u)
-        assert one.wi == pytest.approx(two.wi, rel=1e-6, abs=1e-6)
-        assert one.weight == pytest.approx(two.weight, rel=1e-5)
+        assert_near(one.wi, two.wi, rel=1e-6, abs=1e-6)
+        assert_near(one.weight, two.weight, rel=1e-5)
 
 
 @pytest.mark.parametrize(("kind", "arguments"), CASES, ids=NAMES)

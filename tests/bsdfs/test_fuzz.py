@@ -89,6 +89,7 @@ def test_light_comes_back_to_where_it_came_from():
 
 
 @pytest.mark.parametrize("roughness", [0.15, pytest.param(0.5, marks=pytest.mark.slow), 1.0])
+@pytest.mark.first(1)
 def test_contract(roughness):
     """It is not reciprocal, as in the paper."""
     fuzz = OpenPBRBsdf(base_color=0.0, specular_weight=0.0, fuzz_weight=1.0, fuzz_roughness=roughness)

@@ -24,6 +24,7 @@ def directions(n: int, highest: float = 1.0) -> np.ndarray:
 
 
 @pytest.mark.parametrize("kind", KINDS[:1] + KINDS[3:])
+@pytest.mark.first(1)
 def test_contract(kind: str) -> None:
     """χ², the integral of the density, weights, energy, and reciprocity of MERL."""
     check_bsdf(measured(kind), samples=20_000, angles=(60.0,), reciprocal=kind == "merl")

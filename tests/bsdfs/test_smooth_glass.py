@@ -149,7 +149,7 @@ def test_nothing_leaks_through_walls_with_strongly_tilted_normals(name, lean):
     point = wf.PointLight((0.5, 0, 0.2), 10)
     for integrator, lights in (("naive", []), ("full", [point])):
         scene = wf.Scene([ball(2, OPAQUE[name], lean), area_light], lights, CAMERA)
-        assert render(scene, 16, integrator=integrator).rgb.max() == 0
+        assert render(scene, 8, integrator=integrator).rgb.max() == 0
 
 
 @pytest.mark.parametrize("lean", [0.0, 0.5])

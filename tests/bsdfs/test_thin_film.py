@@ -161,14 +161,14 @@ def test_a_film_of_the_index_of_its_surface_is_none():
     ],
     ids=lambda bsdf: type(bsdf).__name__,
 )
-@pytest.mark.first(2)
+@pytest.mark.first(1)
 def test_contract(bsdf):
     check_bsdf(bsdf, samples=10_000, angles=(10.0, 75.0))
 
 
 def test_smooth_glass_with_a_film_absorbs_nothing():
     check_bsdf(
-        Dielectric(1.5, film_thickness=400, film_ior=1.3), samples=10_000, angles=(10.0, 75.0), albedo=(1, 1)
+        Dielectric(1.5, film_thickness=400, film_ior=1.3), samples=10_000, angles=(60.0,), albedo=(1, 1)
     )
 
 

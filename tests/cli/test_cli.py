@@ -446,7 +446,7 @@ def test_a_picture_that_can_be_saved_nowhere_is_said_to_be_lost(
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="POSIX signals")
-def test_sigterm_ends_the_program_and_leaves_nothing(obj, fast):
+def test_sigterm_ends_the_program_and_leaves_nothing(gltf, fast):
     """While a scratch file that has a name is there."""
     output, options = fast
     code = (
@@ -462,16 +462,16 @@ def test_sigterm_ends_the_program_and_leaves_nothing(obj, fast):
     )
     before = set(output.parent.iterdir())
     done = subprocess.run(
-        [sys.executable, "-c", code, "render", obj, *options], capture_output=True, text=True, timeout=60
+        [sys.executable, "-c", code, "render", gltf, *options], capture_output=True, text=True, timeout=60
     )
     assert (done.returncode, done.stderr) == (143, "")
     assert set(output.parent.iterdir()) == before
 
 
 @pytest.mark.skipif(sys.platform != "linux", reason="names of any bytes")
-def test_names_that_cannot_be_printed_are_no_error(obj, tmp_path):
+def test_names_that_cannot_be_printed_are_no_error(gltf, tmp_path):
     output = os.fsencode(tmp_path) + b"/\xff\xe5.npy"
-    command = [sys.executable, "-m", "wavefront", "render", obj, "-o", output]
+    command = [sys.executable, "-m", "wavefront", "render", gltf, "-o", output]
     environment = {**os.environ, "PYTHONIOENCODING": "ascii:strict"}
     options = ["--spp", "1", "--size", "8x6", "--quiet"]
     done = subprocess.run([*command, *options], capture_output=True, env=environment, timeout=60)

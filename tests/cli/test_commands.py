@@ -13,6 +13,7 @@ import imageio.v3 as iio
 import numpy as np
 import pytest
 from inside import EXTRAS, doctor_command, joined
+from scripts import write_mesh
 
 import wavefront as wf
 from wavefront import cli
@@ -85,11 +86,13 @@ def check_error(status: int, out: str, err: str, message: str) -> None:
     assert err.count("\n") == 1
 
 
-def test_the_program_runs_and_fails_as_its_commands(mesh: Path) -> None:
+def test_the_program_runs_and_fails_as_its_commands(tmp_path: Path) -> None:
+    mesh = tmp_path / "mesh.ply"
+    write_mesh(mesh, ((0, 0, 0), (1, 0, 0), (0, 1, 0)), ((0, 1, 2),))
     assert program("render", mesh, "-o", mesh.with_name("a.png"), *FAST).returncode == 0
     done = program("render", mesh, "--spp", "0", "--quiet", cwd=mesh.parent)
     check_error(done.returncode, done.stdout, done.stderr, "spp is 0")
-    assert sorted(path.name for path in mesh.parent.iterdir()) == ["a.png", "mesh.obj"]
+    assert sorted(path.name for path in mesh.parent.iterdir()) == ["a.png", "mesh.ply"]
 
 
 @pytest.mark.parametrize(

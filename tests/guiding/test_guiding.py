@@ -353,10 +353,10 @@ def test_light_samples_are_weighted_by_what_a_table_draws(short_training: None) 
     assert_mean(found, case.expected, 0.005)
 
 
-def test_guided_pictures_do_not_depend_on_workers_or_waves() -> None:
-    scene = lamp_at_the_ceiling()
+def test_guided_pictures_do_not_depend_on_workers_or_waves(short_training: None) -> None:
+    scene = lamp_at_the_ceiling((8, 8))
     one = wf.render(scene, 4, guide=True, workers=1, progress=False)
-    for options in ({"workers": 2, "executor": "threads"}, {"wave_size": 500}):
+    for options in ({"workers": 2, "executor": "threads"}, {"wave_size": 100}):
         assert np.array_equal(wf.render(scene, 4, guide=True, progress=False, **options).rgb, one.rgb)
 
 

@@ -566,6 +566,7 @@ def test_errors_of_writing_name_no_file_but_the_users(tmp_path, fails):
 
 @posix
 @pytest.mark.parametrize("extension", ["png", "npz"])
+@pytest.mark.first(1)
 def test_a_full_disk_leaves_the_old_file(tmp_path, extension):
     path = tmp_path / f"a.{extension}"
     with_everything().save(path)
@@ -579,6 +580,7 @@ def test_a_full_disk_leaves_the_old_file(tmp_path, extension):
 
 @posix
 @pytest.mark.parametrize(("extension", "pause"), [("exr", 0.07), ("npz", 0.15)])
+@pytest.mark.first(1)
 def test_a_killed_process_leaves_a_whole_file(tmp_path, extension, pause):
     path = tmp_path / f"a.{extension}"
     script = FOREVER.format(folder=os.path.dirname(__file__))

@@ -103,6 +103,7 @@ def part(first: int, end: int, **settings: Any) -> wf.Image:
         pytest.param({"workers": 1, "executor": "threads", "wave_size": 97}, marks=pytest.mark.slow),
     ],
 )
+@pytest.mark.first(1)
 def test_no_bit_depends_on_workers_executor_or_waves(settings: dict[str, Any]) -> None:
     """Of the picture, its errors and all layers; and one call gives the same as another."""
     assert digest(wf.render(scene(), 8, **EVERY, **settings)) == whole()
@@ -156,6 +157,7 @@ def test_views_are_single_renders() -> None:
 
 
 @pytest.mark.parametrize("seed", range(2))
+@pytest.mark.first(1)
 def test_a_render_that_is_stopped_goes_on_with_the_same_bits(tmp_path: Path, seed: int) -> None:
     """At random moments, each part with other workers and waves; then with more samples."""
     rng, path = random.Random(seed), tmp_path / "out.wfck"
@@ -570,7 +572,7 @@ def test_a_window_has_the_light_of_the_whole_picture() -> None:
     assert abs(first.mean() - second.mean()) < 3.5 * error
 
 
-@pytest.mark.parametrize("number", [200, 1500])
+@pytest.mark.parametrize("number", [200, 700])
 def test_ctrl_c_keeps_a_picture_of_the_right_brightness(number: int, tmp_path: Path) -> None:
     """Also in the middle of the first pass over the pixels: the light is that of the paths so far."""
     image = stopped_after(number, spp=8, checkpoint=tmp_path / "a", **{**ALONE, "wave_size": 50})

@@ -82,11 +82,11 @@ def test_metadata_say_how_much_light_is_missing() -> None:
 
 def test_the_bits_do_not_depend_on_workers_or_waves() -> None:
     whole = render(0.3)
-    for settings in ({"wave_size": 70}, {"wave_size": 1000, "workers": 2, "executor": "threads"}):
-        other = wf.render(caustic(), 16, clamp=0.3, lighting=None, **settings)
-        assert np.array_equal(other.rgb, whole.rgb)
-        assert np.array_equal(other.clamped, whole.clamped)
-        assert other.metadata["clamped"] == whole.metadata["clamped"]
+    settings = {"wave_size": 170, "workers": 2, "executor": "threads"}
+    other = wf.render(caustic(), 16, clamp=0.3, lighting=None, **settings)
+    assert np.array_equal(other.rgb, whole.rgb)
+    assert np.array_equal(other.clamped, whole.clamped)
+    assert other.metadata["clamped"] == whole.metadata["clamped"]
 
 
 def test_merged_and_resumed_pictures_know_the_light_that_is_missing(tmp_path: Path) -> None:

@@ -12,35 +12,40 @@ from significance import Mean, assert_same_images, render, repeat
 import wavefront as wf
 
 DIRECT_SPP = {"naive": 256, "direct_simple": 96, "direct_mis": 64, "full": 64}
+# of the runs, and of the samples of each
+parts = pytest.mark.parametrize("part", [2, pytest.param(1, marks=pytest.mark.slow)])
 
 
 @cache
-def room(integrator: str, max_bounces: int, spp: int, sampler: str = "sobol"):
+def room(integrator: str, max_bounces: int, spp: int, sampler: str = "sobol", part: int = 1):
     """Runs of the room with a mirror and a glass sphere; every estimator has seeds of its own."""
     first_seed = 1000 * scenes.ALL.index(integrator)
     options = {"integrator": integrator, "max_bounces": max_bounces, "sampler": sampler}
-    return repeat(scenes.room(), spp, first_seed=first_seed, **options)
+    return repeat(scenes.room(), spp // part, 16 // part, first_seed=first_seed, **options)
 
 
 @pytest.mark.parametrize(("a", "b"), list(combinations(scenes.ALL, 2)))
-def test_direct_light_agrees(a: str, b: str) -> None:
+@parts
+def test_direct_light_agrees(a: str, b: str, part: int) -> None:
     """With one scattering event all four estimate emission and direct light."""
-    assert_same_images(room(a, 1, DIRECT_SPP[a]), room(b, 1, DIRECT_SPP[b]), 0.002)
+    one, other = (room(each, 1, DIRECT_SPP[each], part=part) for each in (a, b))
+    assert_same_images(one, other, 0.002 * part)
 
 
-def test_direct_light_behind_mirrors_and_glass_agrees() -> None:
+@parts
+def test_direct_light_behind_mirrors_and_glass_agrees(part: int) -> None:
     """Both direct estimators follow specular surfaces to the first that is not."""
-    a, b = room("direct_simple", 8, 96), room("direct_mis", 8, 64)
-    assert_same_images(a, b, 0.002)
-    assert a.mean() > 1.05 * room("direct_simple", 1, 96).mean()
+    a, b = (room(each, 8, DIRECT_SPP[each], part=part) for each in ("direct_simple", "direct_mis"))
+    assert_same_images(a, b, 0.002 * part)
+    assert a.mean() > 1.05 * room("direct_simple", 1, DIRECT_SPP["direct_simple"], part=part).mean()
 
 
 @pytest.mark.parametrize("max_bounces", [pytest.param(2, marks=pytest.mark.slow), 8])
-@pytest.mark.first(1)
-def test_indirect_light_agrees(max_bounces: int) -> None:
+@parts
+def test_indirect_light_agrees(max_bounces: int, part: int) -> None:
     """Naive and full, with light that took several bounces, caustics among it."""
-    naive, full = room("naive", max_bounces, 256), room("full", max_bounces, 128)
-    assert_same_images(naive, full, 0.003)
+    naive, full = (room(each, max_bounces, spp, part=part) for each, spp in (("naive", 256), ("full", 128)))
+    assert_same_images(naive, full, 0.003 * part)
 
 
 @pytest.mark.slow
@@ -60,18 +65,20 @@ def test_samplers_agree(sampler: str, spp: int) -> None:
         ),
     ],
 )
-def test_roulette_changes_nothing_but_noise(integrator: str, after: int) -> None:
+@parts
+def test_roulette_changes_nothing_but_noise(integrator: str, after: int, part: int) -> None:
     """From the first bounce on, or never."""
-    usual = room(integrator, 8, 256 if integrator == "naive" else 128)
+    spp = 256 if integrator == "naive" else 128
     options = {"integrator": integrator, "max_bounces": 8, "first_seed": 9000, "roulette": after}
-    other = repeat(scenes.room(), 256 if integrator == "naive" else 128, **options)
-    assert_same_images(usual, other, 0.004)
+    other = repeat(scenes.room(), spp // part, 16 // part, **options)
+    assert_same_images(room(integrator, 8, spp, part=part), other, 0.004 * part)
 
 
+@pytest.mark.slow
 def test_full_has_a_tenth_of_the_variance_of_naive() -> None:
     variance = {}
     for integrator in scenes.INDIRECT:
-        runs = repeat(scenes.cornell_box(), 64, runs=4, integrator=integrator)
+        runs = repeat(scenes.cornell_box(), 64, runs=3, integrator=integrator)
         variance[integrator] = runs.var(0, ddof=1).mean()
     assert variance["full"] < 0.1 * variance["naive"]
 

@@ -218,12 +218,12 @@ def lacquered() -> wf.Scene:
 
 
 @pytest.mark.parametrize(
-    ("spp", "error"), [(8, 0.004), pytest.param(512, 0.0004, marks=pytest.mark.slow)], ids=["quick", "slow"]
+    ("spp", "error"), [(4, 0.008), pytest.param(512, 0.0004, marks=pytest.mark.slow)], ids=["quick", "slow"]
 )
 def test_glossy_points_keep_the_mean(spp: int, error: float) -> None:
     """Each pixel sees their BSDF from elsewhere, and weighs light samples by its own density."""
-    plain = repeat(lacquered(), spp, max_bounces=3)
-    shared = repeat(lacquered(), spp, reuse=True, first_seed=100, max_bounces=3)
+    plain = repeat(lacquered(), spp, 8, max_bounces=3)
+    shared = repeat(lacquered(), spp, 8, reuse=True, first_seed=100, max_bounces=3)
     assert_same_images(plain[:, :24, :24], shared[:, :24, :24], error)
 
 
@@ -243,7 +243,7 @@ def test_no_light_is_lost_or_won(close_tiles: None) -> None:
     """In a closed white room of radiance 1 each sample is 1, whichever pixels it comes from."""
     inside = scenes.box((-1, -1, -1), (1, 1, 1), wf.Diffuse(0.5), emission=0.5, inward=True)
     scene = wf.Scene([inside], camera=wf.Camera.look_at((0, 0, 0), (1, 0.3, 0.2), fov=70, size=(16, 16)))
-    runs = repeat(scene, 16, max_bounces=40, reuse=True)
+    runs = repeat(scene, 4, 8, max_bounces=40, reuse=True)
     assert_mean(Mean.of(runs.mean((1, 2, 3))), 1.0, 0.003)
 
 
@@ -262,7 +262,7 @@ def test_noise_falls() -> None:
     [{"wave_size": 500, "workers": 3}, {"workers": 2, "executor": "processes"}, {"wave_size": 100}],
     ids=str,
 )
-@pytest.mark.first(2)
+@pytest.mark.first(1)
 def test_waves_and_workers_change_no_bit(cut: dict) -> None:
     scene = scenes.everything((31, 25))
     options = {"reuse": True, "branches": 2}
@@ -372,6 +372,7 @@ def half_lit(size: tuple[int, int] = (63, 31)) -> wf.Scene:
 
 @pytest.mark.filterwarnings("ignore:noise=")  # is not reached by so few samples
 @pytest.mark.parametrize("window", [None, (20, 2, 63, 31)])
+@pytest.mark.first(1)
 def test_pixels_of_a_tile_get_their_samples_together(window: tuple[int, int, int, int] | None) -> None:
     """So a pixel's samples are the first that it has where all pixels have as many."""
     scene = half_lit()
@@ -418,7 +419,7 @@ def grouped(size: tuple[int, int] = (16, 16)) -> wf.Scene:
 @pytest.mark.parametrize(
     "options", [{"spp": 3}, {"spp": 2, "branches": 2}, {"spp": 33, "noise": 0.1}], ids=str
 )
-@pytest.mark.first(2)
+@pytest.mark.first(1)
 def test_groups_sum_to_the_picture(options: dict) -> None:
     """To rounding; the picture is that without them, whatever the waves."""
     scene, options = grouped((33, 30)), {**options, "reuse": True, "max_bounces": 3}
@@ -435,14 +436,14 @@ def test_groups_sum_to_the_picture(options: dict) -> None:
 
 
 @pytest.mark.parametrize(
-    ("spp", "error"), [(8, 0.05), pytest.param(512, 0.005, marks=pytest.mark.slow)], ids=["quick", "slow"]
+    ("spp", "error"), [(4, 0.05), pytest.param(512, 0.005, marks=pytest.mark.slow)], ids=["quick", "slow"]
 )
 def test_groups_keep_their_means(spp: int, error: float, close_tiles: None) -> None:
     """Each has the mean of plain paths, by a significance test."""
     runs: list[list[wf.Image]] = [
         [
             render(grouped(), spp, seed=first + seed, reuse=reuse, max_bounces=4, aovs="light_groups")
-            for seed in range(16)
+            for seed in range(10)
         ]
         for first, reuse in ((0, False), (100, True))
     ]
@@ -579,9 +580,9 @@ def caustic(size: int) -> wf.Scene:
 @pytest.mark.parametrize(
     ("runs", "options"),
     [
-        pytest.param(16, {"reuse": True, "sampler": "independent"}, id="shared"),
-        pytest.param(16, {"sampler": "independent"}, id="plain"),
-        pytest.param(16, {"caustics": True}, id="caustic"),
+        pytest.param(10, {"reuse": True, "sampler": "independent"}, id="shared"),
+        pytest.param(16, {"sampler": "independent"}, id="plain", marks=pytest.mark.slow),
+        pytest.param(10, {"caustics": True}, id="caustic"),
         pytest.param(
             200, {"reuse": True, "sampler": "independent"}, id="shared, alone", marks=pytest.mark.slow
         ),

@@ -133,7 +133,7 @@ def changed(document, at, value):
     return document
 
 
-@pytest.mark.parametrize("share", [0.015, pytest.param(1, marks=pytest.mark.slow)])
+@pytest.mark.parametrize("share", [0.008, pytest.param(1, marks=pytest.mark.slow)])
 def test_wrong_values(share, tmp_path):
     path = tmp_path / "a.gltf"
     document = everything(path)

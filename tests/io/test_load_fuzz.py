@@ -333,7 +333,7 @@ def main(seed, count):
 
 
 @pytest.mark.skipif(sys.platform != "linux", reason="memory limits as Linux has them")
-@pytest.mark.parametrize(("seed", "count"), [(0, 40), pytest.param(1, 20000, marks=pytest.mark.slow)])
+@pytest.mark.parametrize(("seed", "count"), [(0, 24), pytest.param(1, 20000, marks=pytest.mark.slow)])
 def test_damaged_files(seed, count):
     done = subprocess.run(
         [sys.executable, __file__, str(seed), str(count)], capture_output=True, text=True, errors="replace"
@@ -358,7 +358,7 @@ def mutated(parts, rng):
 
 
 @pytest.mark.parametrize("name", ["s.xml", "s.pbrt"])
-@pytest.mark.parametrize("count", [40, pytest.param(3000, marks=pytest.mark.slow)])
+@pytest.mark.parametrize("count", [20, pytest.param(3000, marks=pytest.mark.slow)])
 @pytest.mark.filterwarnings("ignore::UserWarning")
 def test_mutated_scenes_are_shown_with_notes_of_file_and_line(tmp_path, name, count):
     make_seeds(tmp_path)

@@ -224,6 +224,7 @@ def lights(kind: type) -> TriangleLights | RectangleLights:
     return kind.from_pairs(corners, column(3, 2, 1))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", [TwoSidedTriangleLights, TwoSidedRectangleLights])
 @pytest.mark.first(1)
 def test_the_contract(kind: type) -> None:
@@ -274,7 +275,7 @@ def test_estimators_agree() -> None:
     assert_same_images(mis, simple, 0.02)
 
 
-@pytest.mark.parametrize("cut", [{"wave_size": 1}, {"wave_size": 50, "workers": 3}])
+@pytest.mark.parametrize("cut", [{"wave_size": 7}, {"wave_size": 50, "workers": 3}])
 def test_waves_and_workers_change_no_bit(cut: dict) -> None:
     whole = render(gallery((6, 5)), 3).rgb
     assert render(gallery((6, 5)), 3, **cut).rgb.tobytes() == whole.tobytes()

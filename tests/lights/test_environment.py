@@ -14,6 +14,7 @@ from inside import (
     srgb_to_linear,
     write_image,
 )
+from near import assert_near
 from scenes import ALBEDO, BLACK, EYE, HERE, floor, panel, probe
 from significance import SIDE, Mean, assert_mean, assert_same_images, measure, render, repeat
 
@@ -278,7 +279,7 @@ def test_pdf_integrates_to_one(suns: list) -> None:
     """Summed over a fine grid of the sphere, for a map with a small sun, and a sky with two more."""
     environment = wf.Environment(sun_map(), transform=turn(0.3, 0.2))
     record = EnvironmentSum.of([light.record(ORIGIN) for light in (environment, *suns)])
-    n = 2000
+    n = 1400
     cos = (np.arange(n) + 0.5) / n * 2 - 1
     phi = (np.arange(2 * n) + 0.5) / n * np.pi
     total = 0.0
@@ -450,15 +451,15 @@ def test_beside_bsdf_samples_what_is_brighter_than_the_mean_is_drawn(transform) 
     left = record.compensated()
     w = directions(20_000)
     excess = np.maximum(record.pdf_li(w, w) - 1 / (4 * np.pi), 0)
-    assert left.pdf_li(w, w) == pytest.approx(excess / left.share, rel=1e-4, abs=1e-6)
+    assert_near(left.pdf_li(w, w), excess / left.share, rel=1e-4, abs=1e-6)
     assert left.le(w).tolist() == record.le(w).tolist()
-    assert left.power(2.0) == pytest.approx(left.share * record.power(2.0))
+    assert_near(left.power(2.0), left.share * record.power(2.0))
     u = np.random.default_rng(4).random((2, 5000)).astype(f4)
     sample = left.sample_li(w[:, :5000], u)
     assert (sample.pdf > 0).all()
-    assert sample.pdf == pytest.approx(left.pdf_li(sample.wi, sample.wi), rel=1e-3)
+    assert_near(sample.pdf, left.pdf_li(sample.wi, sample.wi), rel=1e-3)
     complete = record.pdf_li(sample.wi, sample.wi)
-    assert sample.pdf == pytest.approx((complete - 1 / (4 * np.pi)) / left.share, rel=1e-3)
+    assert_near(sample.pdf, (complete - 1 / (4 * np.pi)) / left.share, rel=1e-3)
 
 
 @pytest.mark.parametrize("radiance", [1.0, np.ones((4, 8, 3)), np.full((16, 32, 3), 0.3)])
@@ -515,7 +516,8 @@ def test_a_sun_before_an_even_sky_gets_all_light_samples() -> None:
     assert (sample.radiance > 0.5).all()
 
 
-@pytest.mark.parametrize("material", [wf.Diffuse(ALBEDO), wf.Conductor.named("gold", roughness=0.7)])
+@pytest.mark.parametrize("material", [wf.Conductor.named("gold", roughness=0.7), wf.Diffuse(ALBEDO)])
+@pytest.mark.first(1)
 def test_an_even_sky_leaves_all_light_samples_to_a_panel(material) -> None:
     """The estimators with BSDF samples draw the panel alone; light samples alone bring the same light."""
     scene = wf.Scene([floor(material), panel((-1, -1), (1, 1), 1)], wf.Environment(0.5), probe(HERE, EYE))

@@ -104,7 +104,7 @@ def test_estimators_agree(holder: str) -> None:
     }[holder]
     scene = wf.Scene([*shapes, FLOOR], camera=SPOT)
     options = {"max_bounces": 3, "lighting": None}
-    found = [measure(scene, 256, integrator=each, seed=7, **options) for each in ("naive", "full")]
+    found = [measure(scene, 128, integrator=each, seed=7, **options) for each in ("naive", "full")]
     both = np.hypot(*(each.error for each in found))
     assert abs(found[0].value - found[1].value) < 4 * both
     assert found[1].error < found[0].error

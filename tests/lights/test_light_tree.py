@@ -45,7 +45,7 @@ def tree(k: int) -> LightTreeSampler:
 @pytest.mark.parametrize("k", [1, 3, 17, 4097])
 def test_sampling_follows_the_probabilities(k: int) -> None:
     """Each of k lights is drawn as often as its pmf says, inside the scene and outside, for extreme u too."""
-    choice, n = tree(k), 1 << 18
+    choice, n = tree(k), 1 << 16
     u = ((np.arange(n) + 0.5) / n).astype(f4)
     for at in ((0.1, 0.2, -0.3), (0.9, -0.9, 0.9), (30, 2, 5)):
         place = np.array(at, f4)[:, None]

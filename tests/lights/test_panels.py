@@ -76,7 +76,7 @@ def test_densities_are_those_of_the_samples(name: str) -> None:
 @pytest.mark.parametrize("name", LIGHTS)
 def test_each_density_is_one_over_the_light(name: str, normal: tuple[float, ...]) -> None:
     """By quadrature over points that are uniform on the area, or in solid angle, to 0.2 %."""
-    n = 300
+    n = 150
     u = ((np.indices((n, n)).reshape(2, -1) + 0.5) / n).astype(f4)
     for point in [(0.2, 0, 0.1), (0.7, 0.9, -0.3), (3, -2, 1), (-1, -2, 4)]:
         light = LIGHTS[name]()
@@ -176,4 +176,4 @@ def test_pictures_keep_their_means(options: dict) -> None:
 @cache
 def by_bsdf_samples() -> list[np.ndarray]:
     """Return pictures of the scene that no light sample has touched."""
-    return repeat(room(), 96, 12, 100, integrator="naive", **SETTINGS)
+    return repeat(room(), 48, 12, 100, integrator="naive", **SETTINGS)

@@ -32,6 +32,7 @@ def pairs(triangles: np.ndarray) -> list[int]:
     [[0.2, 0, 0.1], [0, 0.99, 0], [3, -2, 1], [0.4, 0.9, 5]],
     ids=["below", "close", "far", "grazing"],
 )
+@pytest.mark.first(3)
 def test_rectangles_keep_their_contract(point: list[float]) -> None:
     """Distribution, pdf, radiance and distance: by solid angle nearby and by area from afar."""
     light = RectangleLights.from_pairs(corners(wf.Rectangle((-1, 1, -1), (2, 0, 0), (0, 0, 2)))[:1], WHITE)

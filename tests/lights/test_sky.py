@@ -120,6 +120,7 @@ SKIES = {
 }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["clear", pytest.param("perez", marks=pytest.mark.slow)])
 @pytest.mark.parametrize("mis", [pytest.param(False, marks=pytest.mark.slow), True])
 def test_contract(name: str, mis: bool) -> None:

@@ -206,6 +206,7 @@ def test_estimators_agree() -> None:
     ("integrator", "cut"),
     [("full", {"wave_size": 1}), ("naive", {"wave_size": 64}), ("full", {"wave_size": 50, "workers": 3})],
 )
+@pytest.mark.first(1)
 def test_waves_and_workers_change_no_bit(integrator: str, cut: dict) -> None:
     """Numbers go by surfaces along a ray, not by who asks for them."""
     scene = leaves((6, 5))

@@ -48,6 +48,7 @@ def test_a_wall_sees_half_of_the_sky_and_the_ground() -> None:
 
 
 @pytest.mark.parametrize("sky", [wf.Sky.cie(1, horizontal=100), wf.Sky.cie(16, horizontal=100)])
+@pytest.mark.first(1)
 def test_as_a_measurement_under_the_same_sky(sky: wf.Sky) -> None:
     """A court of walls; the patches of smooth skies are even within half a percent."""
     sides = [

@@ -178,6 +178,7 @@ def test_points_on_a_surface_see_the_side_of_their_normals(offset: float, accel:
 
 
 @pytest.mark.parametrize("accel", ["numpy", "auto"])
+@pytest.mark.first(1)
 def test_points_in_the_middle_of_a_large_surface_are_above_it(accel: str) -> None:
     """There the corners of the surface are rounded by more than the points."""
     rng = np.random.default_rng(7)
@@ -222,7 +223,7 @@ def coverage(points: int, seeds: int, **settings: Any) -> float:
 
 def test_intervals_hold_what_they_say() -> None:
     """And a little more: they allow for what few samples may have missed."""
-    assert 0.95 <= coverage(100, 12, spp=32) <= 0.995
+    assert 0.95 <= coverage(60, 8, spp=32) <= 0.995
 
 
 @pytest.mark.slow

@@ -147,8 +147,7 @@ def test_the_same_bits_whatever_does_the_work(reuse: bool) -> None:
     some: dict[str, Any] = {"spp": 8, "reuse": reuse, "aovs": "indirect", "progress": False}
     due = wf.measure(BOX, POINTS, UP, workers=1, **some)
     ways: tuple[dict[str, Any], ...] = (
-        {"workers": 1, "wave_size": 100},
-        {"workers": 2, "wave_size": 256},
+        {"workers": 2, "wave_size": 100},
         {"workers": 2, "executor": "processes"},
     )
     for way in ways:
@@ -157,8 +156,18 @@ def test_the_same_bits_whatever_does_the_work(reuse: bool) -> None:
             assert found.columns()[name].tobytes() == column.tobytes(), (way, name)
 
 
-@pytest.mark.parametrize("reuse", [False, True])
-@pytest.mark.parametrize("settings", [{"spp": 48}, {"noise": 0.2}], ids=str)
+@pytest.mark.parametrize(
+    ("reuse", "settings"),
+    [
+        (True, {"spp": 48}),
+        (False, {"noise": 0.2}),
+        *(
+            pytest.param(*each, marks=pytest.mark.slow)
+            for each in ((False, {"spp": 48}), (True, {"noise": 0.2}))
+        ),
+    ],
+    ids=str,
+)
 def test_a_stop_and_a_checkpoint_cost_no_bit(reuse: bool, settings: dict[str, Any], tmp_path: Path) -> None:
     some: dict[str, Any] = {**QUIET, **settings, "reuse": reuse, "wave_size": 256}
     due = wf.measure(BOX, POINTS, UP, **{**some, "wave_size": 4096})
@@ -177,6 +186,7 @@ def test_a_stop_and_a_checkpoint_cost_no_bit(reuse: bool, settings: dict[str, An
 
 
 @pytest.mark.parametrize("reuse", [False, True])
+@pytest.mark.first(1)
 def test_merged_parts_are_the_whole(reuse: bool) -> None:
     parts = [
         wf.measure(BOX, POINTS, UP, samples=each, reuse=reuse, **QUIET)

@@ -391,6 +391,7 @@ def test_caustics_of_a_drink(inside: bool, accel: str) -> None:
     assert_same_images(own, from_lights, 0.02)
 
 
+@pytest.mark.slow
 @pytest.mark.first(1)
 @pytest.mark.parametrize("medium", [wf.Medium((0.1, 0.2, 0.3)), None], ids=["haze", "clear air"])
 def test_a_caustic_by_a_point_light_is_dimmed(medium) -> None:

@@ -75,7 +75,7 @@ def test_light_falls_along_a_ray(cells, slope: float) -> None:
     grid = ramp()
     medium = wf.GridMedium(grid, BOX, absorption=SIGMA, majorant_cells=cells)
     along = np.array([1, slope, -slope])
-    t = np.linspace(-1, 1, 100_001)
+    t = np.linspace(-1, 1, 20_001)
     depth = density_at(grid, (along[:, None] * t + 1) / 2).mean() * 2 * np.linalg.norm(along)
     scene = in_box(medium, camera=probe((0, 0, 0), -3 * along))
     for mean, sigma in zip(channels(scene, 256), SIGMA, strict=True):
@@ -86,7 +86,7 @@ def test_light_falls_along_a_ray(cells, slope: float) -> None:
 def test_light_falls_through_noise_that_scatters(cells) -> None:
     """What is neither absorbed nor scattered: paths by delta tracking, shadow rays by ratio tracking."""
     grid, along = noise() / 2, np.array([0.3, -0.2, 1.0])
-    t = np.linspace(-1, 1, 100_001)
+    t = np.linspace(-1, 1, 20_001)
     depth = density_at(grid, (along[:, None] * t + 1) / 2).mean() * 2 * np.linalg.norm(along)
     medium = wf.GridMedium(grid, BOX, SIGMA / 2, SIGMA[::-1], majorant_cells=cells)
     scene = in_box(medium, camera=probe((0, 0, 0), -3 * along))
@@ -274,7 +274,7 @@ def test_same_bits_whatever_workers_and_waves() -> None:
 def test_smoke_of_one_temperature(scattering: float) -> None:
     """B(T)(1 − exp(−τ)), by paths that collect light on the way and by those that may be scattered."""
     grid, along, absorbed = noise(), np.array([0.3, -0.2, 1.0]), np.array([0.2, 0.5, 1.0])
-    t = np.linspace(-1, 1, 100_001)
+    t = np.linspace(-1, 1, 20_001)
     depth = density_at(grid, (along[:, None] * t + 1) / 2).mean() * 2 * np.linalg.norm(along)
     medium = wf.GridMedium(grid, BOX, absorbed, scattering, temperature=np.full(grid.shape, 1800.0))
     scene = wf.Scene([wf.GridBox(medium)], camera=probe((0, 0, 0), -3 * along))

@@ -192,7 +192,7 @@ def test_single_scattering_of_a_point_light(phase: wf.PhaseFunction, integrator:
     fog = wf.Medium(absorbed, scattered, phase=phase)
     light = wf.PointLight((1, 0, 0), 5)
     scene = wf.Scene(FAR, light, probe((0, 0, 0), (0, 0, 4)), medium=fog)
-    t = np.linspace(0, 60, 600_001)
+    t = np.linspace(0, 60, 60_001)
     toward = np.stack([np.ones_like(t), np.zeros_like(t), t - 4])
     d = np.sqrt((toward**2).sum(0))
     cos = -toward[2] / d  # light comes along −toward, and leaves along +z
@@ -215,7 +215,8 @@ def half_space(albedo: float, light: wf.Light) -> wf.Scene:
     return wf.Scene(deep, light, probe((0, 0, 0), (0, 0, 5)))
 
 
-@pytest.mark.parametrize("albedo", [0.5, 0.9])
+@pytest.mark.parametrize("albedo", [0.9, 0.5])
+@pytest.mark.first(1)
 def test_half_space_in_uniform_light(albedo: float) -> None:
     """Seen along the normal it has the radiance 1 − H(1)√(1 − ω)."""
     due = 1 - h_function(albedo) * np.sqrt(1 - albedo)
@@ -224,6 +225,7 @@ def test_half_space_in_uniform_light(albedo: float) -> None:
 
 
 @pytest.mark.parametrize("albedo", [0.5, 0.9])
+@pytest.mark.first(1)
 def test_half_space_in_a_beam(albedo: float) -> None:
     """ω/(4π) · μ₀/(μ + μ₀) · H(μ)H(μ₀), with both cosines 1: by light samples through the border."""
     due = albedo / (8 * np.pi) * h_function(albedo) ** 2

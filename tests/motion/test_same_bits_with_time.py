@@ -103,6 +103,7 @@ WORKERS: list[dict[str, Any]] = [
 
 @pytest.mark.skipif(not sys.platform.startswith("linux"), reason="workers that are forked")
 @pytest.mark.parametrize("how", WORKERS)
+@pytest.mark.first(1)
 def test_any_workers_and_waves_give_the_same_bits(how: dict[str, Any], alone: Any) -> None:
     assert digest(drawn("all", **how)) == alone("all")
 

@@ -40,6 +40,7 @@ def test_sobol_halves_the_error(converged: np.ndarray) -> None:
     assert sobol <= 0.5 * independent
 
 
+@pytest.mark.slow
 def test_sobol_is_steeper_where_the_picture_is_smooth() -> None:
     """On a plain floor under one light the error falls faster than 1/spp, by which independent's falls."""
     floor = wf.Rectangle((-9, 0, 9), (18, 0, 0), (0, 0, -18))

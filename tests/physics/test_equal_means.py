@@ -171,7 +171,7 @@ def test_pictures_by_default(name: str) -> None:
     ("name", "due"),
     [
         pytest.param("furnace of 0.5, 8 bounces", "shared", marks=pytest.mark.slow),
-        ("point light in a sphere", "shared"),
+        pytest.param("point light in a sphere", "shared", marks=pytest.mark.slow),
         ("half-hidden rectangle", "branches 1, branches 4"),
         pytest.param("point light, offset 1.5", "branches 1", marks=pytest.mark.slow),
     ],

@@ -75,7 +75,7 @@ def accel(request: pytest.FixtureRequest, shared_instances: None) -> str:
 def test_a_power_of_two_in_size_changes_no_bit(accel: str, projection: str) -> None:
     unit = picture(room(1.0, projection=projection), accel)
     assert unit.mean() > 0.1
-    for exponent in (-120, -60, -22, -20, 22, 24, 95):
+    for exponent in (-120, -22, 24, 95):
         scaled = picture(room(2.0**exponent, projection=projection), accel)
         assert np.array_equal(scaled, unit), f"2^{exponent}"
 

@@ -22,6 +22,7 @@ import numpy as np
 import pytest
 import scenes
 from inside import HEADER, IndependentSampler, Sensors, checkpoint, npz_chunks, read_header
+from scripts import write_mesh
 
 import wavefront as wf
 from wavefront import cli
@@ -96,6 +97,7 @@ def test_a_render_that_is_stopped_goes_on_with_the_same_bits(tmp_path: Path, see
 
 @pytest.mark.skipif(not sys.platform.startswith("linux"), reason="workers that are forked")
 @pytest.mark.parametrize("view", VIEWS)
+@pytest.mark.first(1)
 def test_worker_processes_go_on_with_the_same_bits(tmp_path: Path, view: str) -> None:
     camera: dict[str, Any] = VIEWS[view]
     stopped_after(900, tmp_path / "a", spp=12, workers=2, executor="processes", wave_size=400, **camera)
@@ -112,6 +114,7 @@ def test_worker_processes_go_on_with_the_same_bits(tmp_path: Path, view: str) ->
     ],
 )
 @pytest.mark.filterwarnings("ignore:noise=0.07 was not reached")
+@pytest.mark.first(1)
 def test_adaptive_renders_go_on_with_the_same_decisions(tmp_path: Path, after: int, view: str) -> None:
     """Whether they are stopped before, within or after a pass over some of the pixels."""
     enough = {"noise": 0.03, "spp": 200} if view == "picture" else {"noise": 0.07, "spp": 64}
@@ -592,19 +595,19 @@ def test_a_full_disk_leaves_the_old_file_and_the_picture(tmp_path, monkeypatch, 
     assert digest(wf.render(scene(), 8, checkpoint=path)) == digest(wf.render(scene(), 8))
 
 
-OBJ = "v -1 -1 0\nv 1 -1 0\nv 0 1 0\nv 0 0 2\nf 1 2 3\nf 1 2 4\nf 2 3 4\n"
+MESH = ((-1, -1, 0), (1, -1, 0), (0, 1, 0), (0, 0, 2)), ((0, 1, 2), (0, 1, 3), (1, 2, 3))
 
 
 @pytest.fixture
 def command(tmp_path: Path, request: pytest.FixtureRequest) -> list[str]:
-    """A command that renders, or measures, for about a second, with a checkpoint."""
-    (tmp_path / "scene.obj").write_text(OBJ)
-    options = ["--spp", "240", "--lighting", "studio", "--quiet", "--workers", "1"]
+    """A command that renders, or measures, for about half a second, with a checkpoint."""
+    write_mesh(tmp_path / "scene.ply", *MESH)
+    options = ["--spp", "120", "--lighting", "studio", "--quiet", "--workers", "1"]
     interval = ["--checkpoint", "out.wfck", "--checkpoint-interval", "0.02"]
     if getattr(request, "param", "picture") == "sensors":
         grid = ["--grid=-2,-2,2.5:4,0,0:0,4,0:60x40", "--normal", "0,0,-1"]
-        return ["measure", "scene.obj", "-o", "out.csv", *grid, *options, *interval]
-    return ["render", "scene.obj", "-o", "out.npy", "--size", "64x48", *options, *interval]
+        return ["measure", "scene.ply", "-o", "out.csv", *grid, *options, *interval]
+    return ["render", "scene.ply", "-o", "out.npy", "--size", "64x48", *options, *interval]
 
 
 def start(arguments: list[str], folder: Path) -> subprocess.Popen[str]:
@@ -702,7 +705,7 @@ def test_signals_keep_the_render(command, tmp_path, number, status, background):
 
     What a script starts in the background ignores Ctrl-C. These tests may run where SIGHUP is ignored.
     """
-    command[command.index("240")] = "30000"
+    command[command.index("120")] = "30000"
     signals = {number: signal.SIG_DFL} | ({signal.SIGINT: signal.SIG_IGN} if background else {})
     before = {each: signal.signal(each, action) for each, action in signals.items()}
     process = start(command, tmp_path)
@@ -720,7 +723,7 @@ def test_signals_keep_the_render(command, tmp_path, number, status, background):
 
 def test_a_full_disk_is_not_status_0(command, tmp_path, monkeypatch, capsys, fails):
     monkeypatch.chdir(tmp_path)
-    command[command.index("240")], command[-1] = "4", "3600"
+    command[command.index("120")], command[-1] = "4", "3600"
     fails("wavefront.film.checkpoint.write_chunks", wf.SaveError("no space"))
     assert cli.main(command) == 2
     assert "error: the checkpoint was not written: no space" in capsys.readouterr().err
@@ -729,7 +732,7 @@ def test_a_full_disk_is_not_status_0(command, tmp_path, monkeypatch, capsys, fai
 
 def test_resume_gives_the_command_again(command, tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
-    command[command.index("240")] = "4"
+    command[command.index("120")] = "4"
     assert cli.main(command) == 0
     picture = (tmp_path / "out.npy").read_bytes()
     (tmp_path / "out.npy").unlink()

@@ -132,6 +132,7 @@ def test_every_executor_gives_the_same_bits(kind: str, workers: int, accel: str)
     assert image.rgb.tobytes() == alone.rgb.tobytes()
 
 
+@pytest.mark.slow
 def test_pictures_come_while_it_renders() -> None:
     """Each is that of a shorter render; another view goes to the same workers."""
     with wf.Session(scenes.everything(), 8, workers=2, executor="spawn", **QUIET) as session:
@@ -269,6 +270,7 @@ def ball(material: wf.Bsdf) -> list[Any]:
         pytest.param(pools_of("fork"), id="made"),
     ],
 )
+@pytest.mark.first(1)
 def test_a_lost_worker_costs_its_jobs_alone(executor: Any, tmp_path: Path) -> None:
     options = {"size": (32, 32), "workers": 2, **QUIET}
     image = wf.render(ball(Deadly(tmp_path / "dead")), 4, executor=executor, **options)

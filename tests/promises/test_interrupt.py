@@ -12,7 +12,7 @@ from pathlib import Path
 import pytest
 import scenes
 from inside import AT_ONCE, STOP, InterruptHandler, SharedInt
-from scripts import ENDLESS, children, end_of, runs, script, wait_for
+from scripts import ENDLESS, children, end_of, runs, script, wait_for, write_mesh
 
 import wavefront as wf
 
@@ -172,8 +172,8 @@ except KeyboardInterrupt:
 
 def test_the_command_saves_the_picture_so_far(tmp_path: Path) -> None:
     """And ends with 130, as shells have it."""
-    scene, output = tmp_path / "triangle.obj", tmp_path / "so_far.exr"
-    scene.write_text("v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n")
+    scene, output = tmp_path / "triangle.ply", tmp_path / "so_far.exr"
+    write_mesh(scene, ((0, 0, 0), (1, 0, 0), (0, 1, 0)), ((0, 1, 2),))
     body = f"""
 import wavefront.cli
 from wavefront.cli import render_command

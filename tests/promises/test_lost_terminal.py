@@ -18,6 +18,7 @@ from typing import Any
 import pytest
 import scenes
 from inside import Bar, notebook, phase, progress, warn_caller
+from scripts import write_mesh
 
 import wavefront as wf
 from wavefront import cli
@@ -148,8 +149,8 @@ def test_a_closed_terminal_keeps_the_picture(tmp_path: Path, ignored: bool) -> N
     """
     import pty
 
-    scene, output, kept = tmp_path / "triangle.obj", tmp_path / "out.npy", tmp_path / "out.wfck"
-    scene.write_text(TRIANGLE)
+    scene, output, kept = tmp_path / "triangle.ply", tmp_path / "out.npy", tmp_path / "out.wfck"
+    write_mesh(scene, ((0, 0, 0), (1, 0, 0), (0, 1, 0)), ((0, 1, 2),))
     spp = "200" if ignored else "1000000"
     options = ["--size", "64x64", "--spp", spp, "--workers", "2", "--checkpoint", kept, "-o", output]
     options += ["--checkpoint-interval", "0.1"]

@@ -139,7 +139,7 @@ def test_no_bit_depends_on_the_budget(executor: str) -> None:
     scene, found = scenes.everything(), set()
     free = wf.render(scene, workers=1, **options)
     fixed = PROCESS_BYTES if executor == "processes" else THREAD_BYTES
-    for room in (1, 2, 3.5, 6):
+    for room in (1, 3.5):
         spare = resident_memory() + picture_memory((64, 48)) + 5 * MEGABYTE
         image = wf.render(scene, workers=3, max_memory=int(spare + room * fixed + 30 * MEGABYTE), **options)
         found.add(image.metadata["workers"])
@@ -169,7 +169,7 @@ class LimitedMemory:
 @pytest.mark.first(2)
 def test_out_of_memory_halves_the_wave_and_goes_on(executor: str, workers: int, fails_at: int) -> None:
     """With the same bits, also when memory runs out in the middle of a render."""
-    scene, options = scenes.everything(), {"spp": 12, "progress": False, "size": (24, 18)}
+    scene, options = scenes.everything(), {"spp": 6, "progress": False, "size": (24, 18)}
     expected = wf.render(scene, workers=1, integrator=LimitedMemory(10**9), **options)
     image = wf.render(
         scene,
@@ -179,7 +179,7 @@ def test_out_of_memory_halves_the_wave_and_goes_on(executor: str, workers: int, 
         wave_size=2000,
         **options,
     )
-    assert image.metadata["samples"] == 12 * 24 * 18
+    assert image.metadata["samples"] == 6 * 24 * 18
     assert image.rgb.tobytes() == expected.rgb.tobytes()
     assert np.array_equal(image.standard_error, expected.standard_error)
 
@@ -188,9 +188,9 @@ def test_waves_stay_small_after_memory_ran_out() -> None:
     """So that not every wave is tried in vain."""
     integrator = LimitedMemory(300)
     options: dict[str, Any] = {"workers": 1, "executor": "threads", "size": (24, 18), "progress": False}
-    wf.render(scenes.everything(), 12, integrator=integrator, wave_size=2000, **options)
+    wf.render(scenes.everything(), 6, integrator=integrator, wave_size=2000, **options)
     smallest = 125  # paths of a wave of 2000, halved while it is above 300, or of what was left of one
-    assert integrator.calls < 12 * 24 * 18 / smallest + 10
+    assert integrator.calls < 6 * 24 * 18 / smallest + 10
 
 
 def test_without_memory_for_a_few_paths_there_is_an_error() -> None:

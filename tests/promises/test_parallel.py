@@ -354,6 +354,7 @@ def by_one_worker(kind: str, accel: str) -> wf.Image:
         ),
     ],
 )
+@pytest.mark.first(4)
 def test_the_executor_changes_no_bit(executor: str, accel: str, kind: str) -> None:
     options = settings_of(kind, accel)
     image = wf.render(scenes.everything(), 8, workers=2, executor=executor, **options)

@@ -95,6 +95,7 @@ def test_a_render_in_a_worker_process(method: str, executor: str, expected: byte
 
 
 @pytest.mark.parametrize("executor", NAMES)
+@pytest.mark.first(1)
 def test_a_render_in_asyncio(executor: str, expected: bytes) -> None:
     begun, turned = threading.Event(), threading.Event()
 

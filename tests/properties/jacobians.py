@@ -10,6 +10,9 @@ from __future__ import annotations
 import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from functools import cache
+from types import ModuleType
+from typing import Any
 
 import numpy as np
 from hypothesis import assume, settings
@@ -34,9 +37,9 @@ KINK = 0.02  # by which one-sided derivatives may differ where the map is smooth
 LARGEST_BOUND = 0.02  # of the error of a derivative, relative
 
 # parts of the examples of the profile: what one costs differs
-some = settings(max_examples=settings.default.max_examples // 4)
-few = settings(max_examples=settings.default.max_examples // 10)
-fewest = settings(max_examples=settings.default.max_examples // 33)
+some = settings(max_examples=settings.default.max_examples * 3 // 20)
+few = settings(max_examples=settings.default.max_examples // 16)
+fewest = settings(max_examples=settings.default.max_examples // 50)
 
 # float32 numbers, away from 0 and 1, so that differences have room on both sides
 inner = st.floats(2.0**-13, 1 - 2.0**-13, width=32)
@@ -62,7 +65,20 @@ def doubles() -> Iterator[None]:
     """Let the formulas of samplers, materials and lights run in float64: `f4` means float64 in them."""
     for table in (dielectric_tables, gloss_tables, sheen_table):
         table()  # it is cached, and stays float32
-    replaced = []
+    narrow = of_float32(len(sys.modules))
+    for module, attribute, _, wide in narrow:
+        setattr(module, attribute, wide)
+    try:
+        yield
+    finally:
+        for module, attribute, have, _ in narrow:
+            setattr(module, attribute, have)
+
+
+@cache
+def of_float32(modules: int) -> list[tuple[ModuleType, str, Any, Any]]:
+    """List what stands for float32 in the modules that are there: module, name, value, and the wide one."""
+    found = []
     for name, module in list(sys.modules.items()):
         if module is None or not (name.startswith(ROOMS) or name in ALONE):
             continue
@@ -72,13 +88,8 @@ def doubles() -> Iterator[None]:
             have = vars(module).get(attribute)
             own = getattr(have, "__module__", None) in ("wavefront.arrays.elementary", "wavefront.arrays.vec")
             if have is np.float32 or (own and attribute in OF_BITS):
-                replaced.append((module, attribute, have))
-                setattr(module, attribute, wide)
-    try:
-        yield
-    finally:
-        for module, attribute, have in replaced:
-            setattr(module, attribute, have)
+                found.append((module, attribute, have, wide))
+    return found
 
 
 def columns(*values: float) -> Doubles:

@@ -56,8 +56,16 @@ def reach(camera: wf.Camera, points: np.ndarray) -> np.ndarray:
     return np.stack([pixels.min(0), pixels.max(0)]) / camera.size
 
 
-@pytest.mark.parametrize("size", SIZES)
-@pytest.mark.parametrize("name", shapes())
+@pytest.mark.parametrize(
+    ("name", "size"),
+    [
+        pytest.param(
+            name, size, marks=pytest.mark.slow if number and size != SIZES[number % len(SIZES)] else []
+        )
+        for number, name in enumerate(shapes())
+        for size in SIZES
+    ],
+)
 def test_a_scene_fills_85_percent_of_the_picture(name: str, size: tuple[int, int]) -> None:
     """Of the width or the height, by rays; it is in the middle, and nothing is cut."""
     scene = wf.Scene(shapes()[name])

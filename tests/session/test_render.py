@@ -41,7 +41,7 @@ def whole(integrator: str, sampler: str) -> bytes:
 )
 def test_waves_and_workers_change_no_bit(integrator: str, sampler: str) -> None:
     """Results are added in the order of the work, not of its completion."""
-    cuts = [{"wave_size": 7}, {"wave_size": 64, "workers": 2}, {"wave_size": 50, "workers": 8}]
+    cuts = [{"wave_size": 17}, {"wave_size": 64, "workers": 2}, {"wave_size": 50, "workers": 8}]
     for cut in cuts if (integrator, sampler) == ("full", "sobol") else cuts[1:2]:
         image = render(scenes.everything(), SPP, integrator=integrator, sampler=sampler, **cut)
         assert image.rgb.tobytes() == whole(integrator, sampler)

@@ -39,6 +39,7 @@ def same(a: wf.Image, b: wf.Image) -> bool:
 
 
 @pytest.mark.parametrize("executor", EXECUTORS)
+@pytest.mark.first(1)
 def test_a_picture_after_every_pass(executor: str) -> None:
     """Doubling, with samples, error and time; the last one is that of render."""
     options = {"workers": 2, "executor": executor, "wave_size": 700, **QUIET}
@@ -295,6 +296,7 @@ def test_idle_workers_end_and_start_again(executor: str, monkeypatch: pytest.Mon
 
 
 @pytest.mark.parametrize("executor", EXECUTORS)
+@pytest.mark.first(1)
 def test_workers_stay_within_a_block(executor: str, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(pool, "IDLE_TIMEOUT", 0.05)
     options = {"workers": 2, "executor": executor, "wave_size": 300, **QUIET}

@@ -90,8 +90,9 @@ def _without_flip(missing) -> None:
     missing("flip_evaluator")
 
 
-@pytest.mark.parametrize("draw", [gaussian, heavy, fireflies, flashes, edges])
+@pytest.mark.parametrize("draw", [flashes, fireflies, gaussian, heavy, edges])
 @pytest.mark.parametrize("spp", [(2, 2), (16, 16), pytest.param((16, 2048), marks=pytest.mark.slow)], ids=str)
+@pytest.mark.first(7)
 def test_false_alarms(draw, spp) -> None:
     """Are at most as frequent as the p-values say, for any distribution of samples."""
     rng, (runs, size) = (
@@ -132,6 +133,7 @@ def noisy_in_a_corner(rng, shape):
 @pytest.mark.parametrize(
     "pair", [(heavy, heavy), (fireflies, quiet), (fireflies, fireflies), (flashes, quiet)]
 )
+@pytest.mark.first(2)
 def test_weights_raise_no_false_alarms(pair) -> None:
     """Nor where one picture has another noise than the other, as one of another estimator has."""
     rng, runs = np.random.default_rng(4), 60

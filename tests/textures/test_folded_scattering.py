@@ -155,8 +155,9 @@ def scene_and_pictures(bsdf, shines):
     return scene, bounces, repeat(scene, 64, runs=8, max_bounces=bounces, reuse=False, first_seed=100)
 
 
-@pytest.mark.parametrize("bsdf", [wf.Diffuse(1.0), wf.Conductor.named("silver", roughness=0.5)])
 @pytest.mark.parametrize("options", WAYS, ids=str)
+@pytest.mark.parametrize("bsdf", [wf.Diffuse(1.0), wf.Conductor.named("silver", roughness=0.5)])
+@pytest.mark.first(4)
 def test_every_way_finds_the_same_light(bsdf, options):
     scene, bounces, expected = scene_and_pictures(bsdf, "integrator" in options)
     spp = 256 if "integrator" in options else 64

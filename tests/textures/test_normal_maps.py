@@ -522,6 +522,7 @@ WAYS = [({"reuse": True}, 32), pytest.param({"guide": True}, 32, marks=pytest.ma
 
 @pytest.mark.parametrize("bsdf", [wf.Diffuse(1.0), wf.Conductor.named("silver", roughness=0.3)])
 @pytest.mark.parametrize(("options", "spp"), WAYS, ids=["reuse", "guide", "emission"])
+@pytest.mark.first(3)
 def test_light_from_a_wall_is_shadowed_however_it_is_found(bsdf, options, spp):
     """The wall is lit by the sun; or it shines, so that light samples and BSDF samples find it."""
     if options:
