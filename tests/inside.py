@@ -343,7 +343,7 @@ from wavefront.scene.state import scene_state
 from wavefront.settings import SETTINGS
 from wavefront.settings.checks import EXCLUSIONS, MEDIA, MOVING_IN_TURN, ROLLING, SETTING_OF, Exclusion, table
 from wavefront.settings.settings import DEFAULT_SPP, LITTLE_NOISE, Settings
-from wavefront.shapes.instance import Instance, can_place, instance_bounds
+from wavefront.shapes.instance import Instance, can_place, instance_bounds, kinds_of
 from wavefront.shapes.mesh import Mesh
 from wavefront.shapes.plate import FACES, plate
 from wavefront.shapes.segments import Cylinders

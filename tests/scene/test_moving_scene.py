@@ -419,6 +419,14 @@ def test_many_instances_are_placed_together():
     assert calls(lambda: many.at(0.75)) - calls(lambda: several.at(0.75)) <= 2.5 * 500
 
 
+def test_what_stands_still_has_its_box_computed_once(calls_of):
+    boxes = calls_of("wavefront.scene.scene.instance_bounds")
+    still = wf.Instance.many(triangle(), [moved(k) for k in range(50)])
+    scene = wf.Scene([*still, wf.Instance(triangle(), SLIDE), wf.Sphere((0, 0, 0), 1).transformed(SLIDE)])
+    np.testing.assert_array_equal(scene.at(1).reach, [[-1, -1, -1], [50, 1, 1]])
+    assert sum(len(call.args[0]) for call in boxes) == 50 + 17  # of the moving one, at 17 times
+
+
 def test_instances_of_a_moment_keep_attributes_of_ones_own_and_know_new_motions():
     instances = wf.Instance.many(triangle(), [SLIDE, SLIDE, SLIDE])
     instances[1].label = "mine"

@@ -22,6 +22,7 @@ from inside import (
     instance_bounds,
     interaction,
     intersect,
+    kinds_of,
     lighted,
     make_accelerator,
     perturb_normals,
@@ -746,3 +747,34 @@ def test_bounds_of_instances_are_those_of_each():
         assert np.array_equal(instance.bounds, box)
         used = instance.to_mesh().bounds
         assert box == pytest.approx(used, rel=1e-12, abs=1e-12)
+
+
+def test_instances_of_one_mesh_and_material_are_of_one_kind() -> None:
+    class Own(wf.Instance):
+        """May have an emission of its own."""
+
+    mesh, gold, ball = wf.Box((0, 0, 0), 1), wf.Material(wf.Mirror(0.5)), wf.Sphere((0, 0, 0), 1)
+    at = np.eye(4)
+    painted = [wf.Instance(mesh, at, material=gold) for _ in range(2)]
+    plain, other = [wf.Instance(mesh, at) for _ in range(2)], wf.Instance(wf.Box((0, 0, 0), 1), at)
+    own = [Own(mesh, at), Own(mesh, at)]
+    shapes = [plain[0], painted[0], ball, painted[1], *own, plain[1], other, ball, mesh]
+    kinds, kind = kinds_of(shapes)
+    assert kinds == [plain[0], painted[0], ball, *own, other, mesh]
+    assert kind.tolist() == [0, 1, 2, 1, 3, 4, 0, 5, 2, 6]
+    assert kinds_of([])[0] == []
+
+
+def test_a_scene_of_many_instances_is_compiled_without_a_loop_over_them() -> None:
+    leaf = wf.Mesh([(0, 0, 0), (1, 0, 0), (0, 1, 0)], [(0, 1, 2)])
+
+    def compiled(count: int) -> int:
+        places = np.tile(np.eye(4), (count, 1, 1))
+        places[:, 2, 3] = np.arange(count)
+        camera = wf.Camera.look_at((0, 0, -5), (0, 0, 0), size=4)
+        scene = wf.Scene(wf.Instance.many(leaf, places), SKY, camera)
+        settings = {"accel": "numpy", "ground": False, "branches": 1, "progress": False, "workers": 1}
+        return calls(lambda: wf.Session(scene, 1, **settings).close())
+
+    compiled(1000)  # warm
+    assert compiled(2000) - compiled(1000) <= 60 * 1000  # by C functions, most of them

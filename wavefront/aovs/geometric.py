@@ -20,6 +20,7 @@ from ..compile.scene import CompiledScene
 from ..film.aov_names import MASKS, aov_of
 from ..materials import Material
 from ..shapes import Instance, Mesh, Shape
+from ..shapes.instance import kinds_of
 from ..stages.generate import center_rays
 from ..stages.interaction import interaction
 from ..stages.passing import covering_hits
@@ -42,16 +43,13 @@ class ShapeTable:
 
     def __init__(self, shapes: Sequence[Shape]) -> None:
         self.shapes = shapes
-        self.instance_of = np.full(len(shapes), -1, np.int32)
-        self.material_of = np.empty(len(shapes), np.int32)
         self._materials: list[Material] = []
         numbers: dict[object, int] = {}  # by identity, and by the parts and the name
-        instances = 0
-        for at, shape in enumerate(shapes):
-            if isinstance(shape, Instance):
-                self.instance_of[at] = instances
-                instances += 1
-            self.material_of[at] = self._number(shape.material, numbers)
+        kinds, kind = kinds_of(shapes)
+        of_kind = [self._number(shape.material, numbers) for shape in kinds]
+        self.material_of = np.array(of_kind, np.int32)[kind]
+        placed = np.array([isinstance(shape, Instance) for shape in kinds])[kind]
+        self.instance_of = np.where(placed, np.cumsum(placed) - 1, -1).astype(np.int32)
 
     def _number(self, material: Material, numbers: dict[object, int]) -> int:
         if id(material) not in numbers:

@@ -26,7 +26,7 @@ from ..arrays.vec import Bools, Doubles, Ints
 from ..lights import Light
 from ..lights.base import FarLight
 from ..shapes import Cylinders, Instance, Mesh, Shape, Sphere
-from ..shapes.instance import instance_bounds
+from ..shapes.instance import instance_bounds, kinds_of
 from .geometry import boxes_of_groups
 
 NEAR = 1e-6  # largest gap of boxes that touch, relative to their size
@@ -57,7 +57,8 @@ def absorbs_alone(shapes: Sequence[Shape], lights: Sequence[Light], scale: float
     lights
         Those of the scene, in its own unit: of `scale`, lengths are multiplied by it for the shapes.
     """
-    absorbers = [number for number, shape in enumerate(shapes) if _absorbs(shape)]
+    kinds, kind = kinds_of(shapes)
+    absorbers = np.flatnonzero(np.array([_absorbs(shape) for shape in kinds], np.bool_)[kind]).tolist()
     if not absorbers:
         return True
     if any(shapes[number].emission is not None for number in absorbers):

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Collection, Sequence
+from itertools import compress
 
 import numpy as np
 
@@ -13,7 +14,7 @@ from ..arrays.state import SoA
 from ..arrays.vec import Doubles, Floats, Ints, f4
 from ..core.errors import SceneError
 from ..shapes import CurvedShape, Instance, Mesh, Shape
-from ..shapes.instance import instance_bounds
+from ..shapes.instance import instance_bounds, kinds_of, transforms_of
 from .curved import order_by_kind
 from .overlaps import overlapping_instances
 
@@ -69,20 +70,21 @@ def sort_shapes(
     instances: list[Instance] = []
     numbers: tuple[list[int], list[int], list[int]] = [], [], []
     for number, shape in enumerate(shapes):
-        if isinstance(shape, Mesh):
+        if isinstance(shape, Instance):  # first, as there may be very many
+            if id(shape) in shared or number in moving:
+                instances.append(shape)
+                numbers[2].append(number)
+            else:
+                meshes.append(shape.to_mesh())
+                numbers[0].append(number)
+        elif isinstance(shape, Mesh):
             meshes.append(shape)
             numbers[0].append(number)
         elif isinstance(shape, CurvedShape):
             curved.append(shape)
             numbers[1].append(number)
-        elif not isinstance(shape, Instance):
-            raise SceneError(f"{shape.name}: cannot trace a {type(shape).__name__}")
-        elif id(shape) in shared or number in moving:
-            instances.append(shape)
-            numbers[2].append(number)
         else:
-            meshes.append(shape.to_mesh())
-            numbers[0].append(number)
+            raise SceneError(f"{shape.name}: cannot trace a {type(shape).__name__}")
     order = order_by_kind(curved, [number in moving for number in numbers[1]])
     positions = [*numbers[0], *(numbers[1][at] for at in order), *numbers[2]]
     return meshes, [curved[at] for at in order], instances, np.array(positions, np.intp)
@@ -108,11 +110,11 @@ def _shareable(instances: Sequence[Instance]) -> set[int]:
     """Return the identities of the instances that emit no light and are not very skewed."""
     if not instances:
         return set()
-    linear = np.stack([instance.transform[:3, :3] for instance in instances])
-    scales = np.linalg.svd(linear, compute_uv=False)
-    even = (scales[:, 0] <= SKEW * scales[:, 2]).tolist()
-    pairs = zip(instances, even, strict=True)
-    return {id(instance) for instance, fits in pairs if fits and instance.emission is None}
+    scales = np.linalg.svd(transforms_of(instances)[:, :3, :3], compute_uv=False)
+    kinds, kind = kinds_of(instances)
+    dark = np.array([shape.emission is None for shape in kinds])[kind]
+    fits = (scales[:, 0] <= SKEW * scales[:, 2]) & dark
+    return set(map(id, compress(instances, fits.tolist())))
 
 
 def own_frame(mesh: Mesh) -> Doubles:
@@ -153,8 +155,8 @@ def place_instances(
     boxes = instance_bounds(instances) - center
     middles = np.stack([mesh.bounds.mean(0) for mesh in shared]).take(mesh_of, 0)
     halves = np.stack([np.ptp(mesh.bounds, axis=0) / 2 for mesh in shared]).take(mesh_of, 0)
-    linear = np.stack([instance.transform[:3, :3] for instance in instances])
-    shift = np.stack([instance.transform[:3, 3] for instance in instances])
+    matrices = transforms_of(instances)
+    linear, shift = matrices[:, :3, :3], matrices[:, :3, 3].copy()
     shift += (linear * middles[:, None]).sum(2) - center
     inverse = np.linalg.inv(linear)
     to_local = np.concatenate([inverse, -(inverse * shift[:, None]).sum(2)[:, :, None]], 2)

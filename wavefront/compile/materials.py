@@ -16,6 +16,7 @@ from ..core.plural import plural
 from ..materials import Material, Opacity
 from ..shapes import CurvedShape, Instance, Mesh, Shape
 from ..shapes.attributes import ATTRIBUTES
+from ..shapes.instance import kinds_of
 from ..textures.base import BaseTexture
 from ..textures.normal_map import BaseNormalMap
 
@@ -112,7 +113,8 @@ def find_alpha(
     """Return a mask of the primitives (m + k + 1,) with an opacity below 1; a miss, at the end, has none."""
     has_alpha = np.array([material.opacity is not None for material in materials], np.bool_)
     mask = np.append(has_alpha.take(material_of), False)
-    placed = {id(shape.mesh) for shape in instances if shape.material.opacity is not None}
+    kinds, _ = kinds_of(instances)
+    placed = {id(shape.mesh) for shape in kinds if shape.material.opacity is not None}
     start = 0
     for mesh in meshes:
         end = start + len(mesh.faces)
@@ -173,14 +175,8 @@ def attributes_read(shapes: Sequence[Shape]) -> list[str]:
     """
     read: set[str] = set()
     lacking: dict[str, dict[int, str]] = {}  # attribute -> names of the meshes that lack it, by identity
-    seen: set[tuple[int, int]] = set()  # meshes and materials of instances
     of_material: dict[int, set[str]] = {}
-    for shape in shapes:
-        if isinstance(shape, Instance):
-            pair = id(shape.mesh), id(shape.material)
-            if pair in seen:
-                continue
-            seen.add(pair)
+    for shape in kinds_of(shapes)[0]:
         mesh = shape.mesh if isinstance(shape, Instance) else shape
         glow = shape.emission.reads if isinstance(shape.emission, BaseTexture) else ()
         if id(shape.material) not in of_material:
@@ -241,21 +237,22 @@ def number_materials(
     numbers: dict[int, int] = {}
     of_parts: dict[tuple[int, ...], int] = {}
     materials: list[Material] = []
-    of_shape: list[int] = []
-    shapes: list[Shape] = [*meshes, *curved, *instances]
-    for shape in shapes:
+    of_kind: list[int] = []
+    kinds, kind = kinds_of([*meshes, *curved, *instances])
+    for shape in kinds:
         material = shape.material
         if id(material) not in numbers:
             number = of_parts.setdefault(material_parts(material), len(materials))
             numbers[id(material)] = number
             if number == len(materials):
                 materials.append(material)
-        of_shape.append(numbers[id(material)])
-    rows = len(meshes) + len(curved)
+        of_kind.append(numbers[id(material)])
+    rows, of_shape = len(meshes) + len(curved), np.array(of_kind, np.intp)[kind]
     counts = [len(mesh.faces) for mesh in meshes] + [shape.count for shape in curved]
-    of_row = np.repeat(np.array(of_shape[:rows], np.intp), counts)
-    replaces = [instance.material is not instance.mesh.material for instance in instances]
-    replaced = np.where(replaces, np.array(of_shape[rows:], np.intp), -1) if any(replaces) else None
+    of_row = np.repeat(of_shape[:rows], counts)
+    others = [isinstance(shape, Instance) and shape.material is not shape.mesh.material for shape in kinds]
+    replaces = np.array(others, np.bool_)[kind][rows:]
+    replaced = np.where(replaces, of_shape[rows:], -1) if replaces.any() else None
     return materials, of_row, replaced
 
 

@@ -23,7 +23,7 @@ from ..lights import Environment, Light
 from ..media import BaseMedium
 from ..motion import Moving
 from ..shapes import Group, Instance, Mesh, PrimitiveArray, Shape
-from ..shapes.instance import instance_bounds, instance_hulls
+from ..shapes.instance import instance_bounds, instance_hulls, kinds_of
 from .file_moments import FileMoments
 from .html import scene_html
 from .loss import Loss
@@ -227,7 +227,7 @@ class Scene(Answers):
         if not self.shapes:
             raise SceneError("the scene has no shapes")
         _check_environments(self.lights)
-        for shape in self.shapes:
+        for shape in kinds_of(self.shapes)[0]:
             if isinstance(shape, Mesh | PrimitiveArray):
                 shape.check()
 
@@ -324,14 +324,14 @@ class Scene(Answers):
         return self if self._whole is None else self._whole
 
     @property
-    def _samples(self) -> list[Scene]:
+    def _samples(self) -> Iterable[Scene]:
         """Scenes of some times, which together reach as far as the shapes ever do."""
         source = self._source
         if source.file_moments is not None:
             return source.file_moments.samples(source)
         if not source._moving.any:
             return [self]
-        return [source.at(time) for time in np.linspace(*source._span(), MOMENTS)]
+        return (source.at(time) for time in np.linspace(*source._span(), MOMENTS))  # not all at once
 
     @property
     def reach(self) -> Doubles:
@@ -340,19 +340,24 @@ class Scene(Answers):
         if not source._moving.any and source.file_moments is None:
             return self.bounds
         if source._reach is None:
-            boxes = np.stack([moment.bounds for moment in self._samples])
-            source._reach = np.stack([boxes[:, 0].min(0), boxes[:, 1].max(0)])
+            source._reach = _around(source._boxes())
         return source._reach
+
+    def _boxes(self) -> Doubles:
+        """Return the bounds (n, 2, 3) of all shapes at some times; of those that stand still, once."""
+        own, seen, boxes = set(map(id, self.shapes)), set[int](), []
+        for moment in self._samples:
+            there = set(map(id, moment.shapes))
+            seen |= there & own
+            boxes.append(_boxes_of([shape for shape in moment.shapes if id(shape) not in own]))
+        return np.concatenate([*boxes, _boxes_of([shape for shape in self.shapes if id(shape) in seen])])
 
     # --- Where it is ----------------------------------------------------------------------------------
 
     @property
     def bounds(self) -> Doubles:
         """Lower and upper corner of all shapes, (2, 3), scene units."""
-        instances = [shape for shape in self.shapes if isinstance(shape, Instance)]
-        alone = [shape.bounds for shape in self.shapes if not isinstance(shape, Instance)]
-        boxes = np.concatenate([np.array(alone).reshape(-1, 2, 3), instance_bounds(instances)])
-        return np.stack([boxes[:, 0].min(0), boxes[:, 1].max(0)])
+        return _around(_boxes_of(self.shapes))
 
     @property
     def has_lights_of_file(self) -> bool:
@@ -362,8 +367,9 @@ class Scene(Answers):
     @property
     def emits(self) -> bool:
         """True if the scene has any light, also of a medium that glows."""
-        media = [self.medium, *(shape.material.interior for shape in self.shapes)]
-        shines = any(shape.emission is not None for shape in self.shapes)
+        kinds, _ = kinds_of(self.shapes)
+        media = [self.medium, *(shape.material.interior for shape in kinds)]
+        shines = any(shape.emission is not None for shape in kinds)
         return bool(self.lights) or shines or any(medium.glows for medium in media if medium is not None)
 
     @suggests_keywords
@@ -461,6 +467,18 @@ class Scene(Answers):
         return np.concatenate([centers for centers, _ in hulls]), np.concatenate(
             [radii for _, radii in hulls]
         )
+
+
+def _boxes_of(shapes: Sequence[Shape]) -> Doubles:
+    """Return the bounds (n, 2, 3) of shapes, in any order."""
+    instances = [shape for shape in shapes if isinstance(shape, Instance)]
+    alone = [shape.bounds for shape in shapes if not isinstance(shape, Instance)]
+    return np.concatenate([np.array(alone).reshape(-1, 2, 3), instance_bounds(instances)])
+
+
+def _around(boxes: Doubles) -> Doubles:
+    """Return the box (2, 3) around others (n, 2, 3)."""
+    return np.stack([boxes[:, 0].min(0), boxes[:, 1].max(0)])
 
 
 def _flat_normal(points: Doubles, radii: Doubles) -> Doubles | None:

@@ -4,13 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from copy import copy
+from itertools import compress, count
+from operator import attrgetter
 from os import PathLike
 from typing import Any, Self, TypeVar
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ..arrays.vec import FLOAT32_MAX, Bools, Doubles
+from ..arrays.vec import FLOAT32_MAX, Bools, Doubles, Ints
 from ..core.errors import SceneError, finite_array, in_brief, number
 from ..core.memory import unwatched
 from ..core.suggestions import suggests_keywords
@@ -243,6 +245,7 @@ class Instance(Shape):
 
 
 I = TypeVar("I", bound=Instance)
+S = TypeVar("S", bound=Shape)
 
 
 def placed_together(
@@ -302,20 +305,50 @@ def can_place(mesh: Mesh, transforms: Doubles) -> Bools:
     return good
 
 
+def transforms_of(instances: Sequence[Instance]) -> Doubles:
+    """Return the matrices (n, 4, 4) of instances."""
+    if not instances:
+        return np.zeros((0, 4, 4))
+    return np.concatenate(list(map(attrgetter("transform"), instances))).reshape(-1, 4, 4)
+
+
+def by_mesh(instances: Sequence[Instance]) -> list[Ints]:
+    """Return the numbers of the instances of each distinct mesh."""
+    if not instances:
+        return []
+    ids = np.fromiter(map(id, map(attrgetter("mesh"), instances)), np.uint64, len(instances))
+    order = np.argsort(ids, kind="stable")
+    return np.split(order, np.flatnonzero(np.diff(ids.take(order))) + 1)
+
+
+def kinds_of(shapes: Sequence[S]) -> tuple[list[S], Ints]:
+    """Return shapes, of all instances of one mesh with one material the first, and the number of each there.
+
+    All that follows from mesh and material is the same for those.
+    """
+    keys: list[Any] = list(map(id, shapes))
+    placed = [kind is Instance for kind in map(type, shapes)]  # one of a class of its own may differ
+    instances: list[Any] = list(compress(shapes, placed))
+    parts = (map(id, map(attrgetter(name), instances)) for name in ("mesh", "_material"))
+    for at, key in zip(compress(count(), placed), zip(*parts, strict=True), strict=False):
+        keys[at] = key
+    numbers: dict[Any, int] = {}
+    kind = np.array([numbers.setdefault(key, len(numbers)) for key in keys], np.intp)
+    first = dict(zip(reversed(keys), reversed(shapes), strict=True))
+    return [first[key] for key in numbers], kind
+
+
 def instance_bounds(instances: Sequence[Instance]) -> Doubles:
     """Return the `bounds` of instances, (n, 2, 3); instances of one mesh are computed together."""
-    out = np.empty((len(instances), 2, 3))
-    numbers: dict[int, list[int]] = {}  # by mesh
-    for at, instance in enumerate(instances):
-        numbers.setdefault(id(instance.mesh), []).append(at)
-    for members in numbers.values():
+    out, matrices = np.empty((len(instances), 2, 3)), transforms_of(instances)
+    for members in by_mesh(instances):
         mesh = instances[members[0]].mesh
         used = np.flatnonzero(np.bincount(mesh.faces.ravel(), minlength=len(mesh.vertices)))
         vertices = mesh.vertices.take(used, 0).T
         step = max(1, MOST_PLACED // used.size)
         for begin in range(0, len(members), step):
             batch = members[begin : begin + step]
-            transforms = np.stack([instances[at].transform for at in batch])
+            transforms = matrices.take(batch, 0)
             with np.errstate(over="ignore", invalid="ignore"):
                 placed = transforms[:, :3, :3] @ vertices + transforms[:, :3, 3:]
             out[batch, 0], out[batch, 1] = placed.min(2), placed.max(2)
