@@ -2,6 +2,7 @@
 
 # ruff: noqa: F401
 from wavefront.accel import coplanar, instances, triangle
+from wavefront.accel.apart import ApartAccelerator, build_apart, still_triangles
 from wavefront.accel.balls import MOST, BoundingBalls, bounding_balls
 from wavefront.accel.base import Accelerator, Geometry, Intersections
 from wavefront.accel.brute_force import BruteForceTriangles

@@ -36,7 +36,7 @@ def unfiltered(kind: CurvedPrimitives) -> NumpyAccelerator:
 def check(kind: CurvedPrimitives, origin: np.ndarray, direction: np.ndarray, left: np.ndarray) -> float:
     """No ray that hits is left out; return the part of the rays that pass and are kept all the same."""
     hit = unfiltered(kind).closest(origin, direction, left).prim >= 0
-    lanes = BoundingBalls([kind]).near(origin, direction, left)
+    lanes = BoundingBalls.of([kind]).near(origin, direction, left)
     kept = np.zeros(hit.size, bool)
     kept[lanes] = True
     assert not (hit & ~kept).any()
@@ -93,7 +93,7 @@ def test_rays_that_leave_a_sphere_along_its_tangents() -> None:
 def test_rays_that_are_none_are_kept_and_hit_nothing() -> None:
     origin, direction = np.zeros((3, 3), f4), np.full((3, 3), np.nan, f4)
     origin[:, 1], direction[:, 2] = 3e30, 0
-    assert BoundingBalls([SPHERES]).near(origin, direction, nothing(3)) == ALL
+    assert BoundingBalls.of([SPHERES]).near(origin, direction, nothing(3)) == ALL
     assert (unfiltered(SPHERES).closest(origin, direction, nothing(3)).prim < 0).all()
 
 

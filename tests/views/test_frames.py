@@ -123,6 +123,40 @@ def test_only_what_moves_is_built_anew(calls_of: Any) -> None:
     assert (len(compiled), len(built)) == (7, 3)
 
 
+def beside_a_wall(**more: Any) -> wf.Scene:
+    """A box that moves up over the top of a wall of 128 triangles."""
+    wall = np.concatenate([wf.Rectangle((k, 0, -1), (1, 0, 0), (0, 1, 0)).vertices for k in range(64)])
+    faces = np.arange(256).reshape(-1, 4)[:, [0, 1, 2, 0, 2, 3]].reshape(-1, 3)
+    rise = wf.Keyframes([0, 2], [moved(0, 0.1), moved(0.3, 2)])
+    shapes = [wf.Mesh(wall - (32, 0, 0), faces), wf.Box((0, 0, 0), 1).transformed(rise)]
+    camera = wf.Camera.look_at((0, 1, 5), (0, 1, 0), fov=40, size=(20, 16))
+    return wf.Scene(shapes, [wf.Environment(1)], camera, **more)
+
+
+@pytest.mark.parametrize("accel", ["numpy", "auto"])
+@pytest.mark.parametrize("shutter", [None, 0.5])
+def test_the_tree_of_what_stands_still_is_kept(
+    accel: str, shutter: float | None, calls_of: Any, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("wavefront.accel.apart.LEAST", 100)
+    built = calls_of("wavefront.accel.cache.make_accelerator")
+    times = [0, 0.5, 1.75]
+    given: Any = {"shutter": shutter, "accel": accel, **QUIET}
+    frames = list(wf.render_frames(beside_a_wall(), times, 2, **given))
+    assert [len(call.args[0].triangles) for call in built].count(128) == 1
+    for each, image in zip(times, frames, strict=True):
+        if shutter is None:
+            due = wf.render(beside_a_wall().at(each), 2, accel=accel, **QUIET)
+        else:
+            opened = each - shutter / 48, each + shutter / 48
+            due = wf.render(beside_a_wall(), 2, accel=accel, **{**QUIET, "shutter": opened})
+        assert bits(image) == bits(due)
+    monkeypatch.setattr("wavefront.accel.apart.LEAST", 1000)
+    joined = wf.render(beside_a_wall().at(0.5), 2, accel=accel, **QUIET)
+    if shutter is None:
+        np.testing.assert_allclose(frames[1].rgb, joined.rgb, rtol=1e-4)
+
+
 def test_files_are_read_once(tmp_path: Path, calls_of: Any) -> None:
     path = animated(tmp_path / "a.gltf")
     reads = calls_of("wavefront.io.load.read")

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import Self
 
 import numpy as np
 
@@ -12,24 +13,40 @@ from .sphere import SpherePrimitives
 from .triangle import ROUNDOFF
 
 MOST = 4  # each costs a ray about 15 ns; the matrix product and its preparation cost 100
+ENLARGED = 1 + 1e-6  # of a squared radius, for its rounding
 MARGIN = f4(64 * ROUNDOFF)  # of squared lengths, more than all rounding errors together
 
 
 class BoundingBalls:
-    """The bounding balls of curved primitives, for rays in float32.
+    """A few balls that bound what rays in float32 may hit.
 
     Parameters
     ----------
-    kinds
-        At most `MOST` primitives together.
+    balls
+        Center (3, 1) and squared radius of each, and whether it is a sphere itself.
     """
 
-    def __init__(self, kinds: Sequence[CurvedPrimitives]) -> None:
-        self._balls: list[tuple[Floats, np.float32, bool]] = []
+    def __init__(self, balls: Sequence[tuple[Floats, np.float32, bool]]) -> None:
+        self._balls = balls
+
+    @classmethod
+    def of(cls, kinds: Sequence[CurvedPrimitives]) -> Self:
+        """Return the bounding balls of at most `MOST` curved primitives together."""
+        balls: list[tuple[Floats, np.float32, bool]] = []
         for kind in kinds:
             centers, radii = kind.balls
             for center, radius in zip(centers.T, radii, strict=True):
-                self._balls.append((column(center), np.square(radius), isinstance(kind, SpherePrimitives)))
+                balls.append((column(center), np.square(radius), isinstance(kind, SpherePrimitives)))
+        return cls(balls)
+
+    @classmethod
+    def around(cls, triangles: Floats) -> Self:
+        """Return the ball around the middle of the box of triangles (m, 3, 3)."""
+        corners = triangles.reshape(-1, 3).astype(np.float64)
+        middle = (corners.min(0) + corners.max(0)) / 2
+        center = middle.astype(f4)
+        radius2 = ((corners - center) ** 2).sum(1).max()
+        return cls([(column(center), f4(radius2 * ENLARGED), False)])
 
     def near(self, origin: Floats, direction: Floats, exclude_prim: Ints) -> Lanes:
         """Return the lanes (k,) of rays (3, n) that may hit a primitive; a slice where all may.
@@ -56,4 +73,4 @@ class BoundingBalls:
 
 def bounding_balls(kinds: Sequence[CurvedPrimitives]) -> BoundingBalls | None:
     """Return the balls of a few curved primitives; None where there are more."""
-    return BoundingBalls(kinds) if sum(map(len, kinds)) <= MOST else None
+    return BoundingBalls.of(kinds) if sum(map(len, kinds)) <= MOST else None

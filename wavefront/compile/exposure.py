@@ -5,10 +5,12 @@ from __future__ import annotations
 from collections.abc import Sequence
 from copy import copy
 from itertools import accumulate
+from operator import is_not
 from typing import Any
 
 import numpy as np
 
+from ..accel.apart import are_many
 from ..arrays.vec import Doubles
 from ..core.errors import SceneError, warn_caller
 from ..lights import Environment
@@ -41,10 +43,11 @@ def exposed_scene(scene: Scene, shutter: Shutter | None) -> Exposed:
         If something moves in a way that cannot be shown.
     """
     if shutter is None:
-        return Exposed(scene)
+        return Exposed(scene, changed=scene.changed)
     scene = _sampled(scene, shutter)
     if not any(_moves(element, shutter) for element in (*scene.shapes, *scene.lights)):
-        return Exposed(scene.at(shutter.middle))
+        moment = scene.at(shutter.middle)
+        return Exposed(moment, changed=moment.changed)
     still, moving = copy(scene), [shape for shape in scene.shapes if _moves(shape, shutter)]
     times = np.linspace(shutter.begin, shutter.end, TIMES).tolist()
     boxes = [Scene([shape.at(time) for shape in moving]).bounds for time in times if moving]
@@ -55,11 +58,37 @@ def exposed_scene(scene: Scene, shutter: Shutter | None) -> Exposed:
         if _moves(shape, shutter):
             shapes[number], exposed.movers[number] = forms.mover(shape, shapes[number])
     still.shapes = shapes
+    exposed.changed = np.array(list(map(is_not, shapes, scene.shapes)))
     still.lights = [light.at(shutter.middle) for light in scene.lights]
     for number, light in enumerate(scene.lights):
         if _moves(light, shutter):
             exposed.lights[number] = _rigid(light, shutter)
     return exposed
+
+
+def middle_of(exposed: Exposed, low: Doubles, high: Doubles, scale: float) -> tuple[Doubles, Doubles]:
+    """Return the point (3,) that a scene is compiled around, and how far it reaches from there, (3,).
+
+    It is the middle of its corners (3,). But where many triangles stand still it is their middle, unless they
+    are a small part of the scene, so that what follows from their places is the same at all times.
+
+    Parameters
+    ----------
+    scale
+        Lengths of the scene have been multiplied by it for the corners.
+    """
+    middle, half = (low + high) / 2, (high - low) / 2
+    if exposed.changed is None or not exposed.changed.any():
+        return middle, half
+    pairs = zip(exposed.scene.shapes, exposed.changed.tolist(), strict=True)
+    still = [shape for shape, changes in pairs if not changes and isinstance(shape, Mesh)]
+    if not are_many(sum(len(mesh.faces) for mesh in still)):
+        return middle, half
+    boxes = np.stack([mesh.bounds for mesh in still]) * scale
+    first, last = boxes[:, 0].min(0), boxes[:, 1].max(0)
+    if np.linalg.norm(last - first) < np.linalg.norm(half):
+        return middle, half
+    return (first + last) / 2, np.maximum(high - (first + last) / 2, (first + last) / 2 - low)
 
 
 def _sampled(scene: Scene, shutter: Shutter) -> Scene:

@@ -56,6 +56,7 @@ class Exposed:
     boxes: tuple[Doubles, ...] = ()  # (2, 3) each, the corners of all that moves at some times
     # (k,) s, times at which something may go another way
     keys: Doubles = field(default_factory=lambda: np.zeros(0))
+    changed: Bools | None = None  # (n,) which shapes are other ones at other times; None where none are
 
     @property
     def bounds(self) -> Doubles:

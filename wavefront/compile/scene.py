@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 
 from ..accel import Accelerator, Geometry
+from ..accel.apart import build_apart
 from ..accel.plate import beside_plate
 from ..arrays.soa import soa
 from ..arrays.vec import Bools, Doubles, Floats, Ints
@@ -22,7 +23,7 @@ from ..shapes import Shape
 from ..shapes.attributes import ATTRIBUTES, Corners, corner_values
 from .absorption import absorbs_alone
 from .curved import CurvedTable
-from .exposure import exposed_scene
+from .exposure import exposed_scene, middle_of
 from .geometry import compute_corner_normals, gather_triangles, same_as_next
 from .instances import InstanceTable, own_frame, place_instances, sort_shapes
 from .light_groups import BY_DEFAULT, LightGroups
@@ -165,7 +166,7 @@ def gather_scene(
     scale = length_factor(radius)
     check_lights(scene.lights, (low + high) / 2, scale)
     low, high = low * scale, high * scale
-    center = (low + high) / 2
+    center, half_size = middle_of(exposed, low, high, scale)
     scaled = scaled_shapes(scene.shapes, scale)
     meshes, curved, instances, numbers = sort_shapes(scaled, most_copies, exposed.movers)
     placed: list[Shape] = [*meshes, *curved, *instances]
@@ -207,7 +208,7 @@ def gather_scene(
             len(material_of),
             [name for name in attributes_read(placed) if ATTRIBUTES[name].vectors],
         )
-        reach = float(np.linalg.norm(high - low)) / 2
+        reach = float(np.linalg.norm(half_size))
         motion.lights, motion.motion_of_light = light_motions(exposed, center, scale, reach)
     if media is not None and placements is not None and motion is not None:
         media.bounds = with_places(media.bounds, placements)
@@ -219,7 +220,7 @@ def gather_scene(
         curved,
         vertices,
         center,
-        (high - low) / 2,
+        half_size,
         light_sampler,
         mis,
         glowing,
@@ -239,7 +240,8 @@ def gather_scene(
     shape_numbers = number_shapes(meshes, curved, instances, numbers, moving)
     interchangeable = None if weights else same_as_next(material_of[:once], light_of[:once], shape_of)
     geometry = Geometry(triangles[:once], table_of_curved.kinds[:still], weights, interchangeable)
-    accelerator = beside_plate(make_accelerator, geometry, has_alpha)
+    moves = None if exposed.changed is None else exposed.changed.take(shape_of)
+    accelerator = beside_plate(partial(build_apart, make_accelerator, moves), geometry, has_alpha)
     if placements is not None:
         ends = np.cumsum([len(mesh.faces) for mesh in shared])
         parts = np.split(triangles[once:], ends[:-1])[: len(shared)]
@@ -299,7 +301,7 @@ def gather_scene(
         motion=motion,
         specular_surfaces=specular,
         media=media,
-        places=MortonGrid.over((high - low) / 2) if len(triangles) >= LARGE else AnyOrder(),
+        places=MortonGrid.over(half_size) if len(triangles) >= LARGE else AnyOrder(),
     )
     return Facts(
         scene=scene,

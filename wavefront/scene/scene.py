@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike
 
 from ..accel import AcceleratorCache
 from ..arrays.elementary import sin_cos
-from ..arrays.vec import Doubles
+from ..arrays.vec import Bools, Doubles
 from ..camera import Camera, ImageSize, check_camera, field_of_view, image_size, upward
 from ..camera.framing import FILL, Balls, fitting_offset, turned_balls
 from ..core.errors import SceneError, finite_array, in_brief, mapping, number
@@ -317,6 +317,14 @@ class Scene(Answers):
     def whole(self) -> Scene:
         """The scene with all its times, of which this one may be a moment."""
         return self._source
+
+    @property
+    def changed(self) -> Bools | None:
+        """Which shapes of a moment are not those of the scene itself, (n,); None where it is no moment."""
+        if self._whole is None:
+            return None
+        own = set(map(id, self._whole.shapes))
+        return np.array([id(shape) not in own for shape in self.shapes])
 
     @property
     def _source(self) -> Scene:
