@@ -61,6 +61,10 @@ class InstancedSurfaces(Surfaces):
         assert self.column is not None
         return self._table.normal.take(take(self.column, lanes), 1)
 
+    def normals_there(self, normals: Floats, lanes: Lanes) -> Floats:
+        """Return normals (3, k) of some lanes in the scene; not of unit length."""
+        return times(self.normal_matrices(lanes), normals)
+
     def vector_matrices(self) -> Floats:
         """Return the matrices (9, n) of vectors to the scene."""
         assert self.column is not None
@@ -77,7 +81,7 @@ class InstancedSurfaces(Surfaces):
         if self.column is None:
             return ng, error
         lanes = self.placed_lanes()
-        there = times(self.normal_matrices(lanes), take(ng, lanes))
+        there = self.normals_there(take(ng, lanes), lanes)
         size = length(there)
         size = np.where(size > 0, size, f4(1))
         more = (

@@ -112,15 +112,21 @@ class MovingSurfaces(InstancedSurfaces):
 
     def normal_matrices(self, lanes: Lanes) -> Floats:
         """Return the matrices (9, k) of normals to the scene, as it is then."""
+        matrices = super().normal_matrices(lanes)
+        put(matrices, self._moves, self._matrix.take(TRANSPOSED, 0) * self._scale())
+        return matrices
+
+    def normals_there(self, normals: Floats, lanes: Lanes) -> Floats:
+        """Return normals (3, k) of some lanes in the scene, as it is then; not of unit length."""
+        if lanes is self._moves:
+            return (transposed_turned(self._matrix, normals) * self._scale()).astype(f4)
+        return super().normals_there(normals, lanes)
+
+    def _scale(self) -> Floats:
+        """Return by what the normals (k,) of what moves are multiplied, so that they are not too long."""
         assert self.scene.motion is not None
         assert self.column is not None
-        moving = self._matrix.take(TRANSPOSED, 0)
-        moving *= self.scene.motion.scale.take(self.column.take(self._moves))
-        if lanes is self._moves:
-            return moving.astype(f4)
-        matrices = super().normal_matrices(lanes)
-        put(matrices, self._moves, moving)
-        return matrices
+        return self.scene.motion.scale.take(self.column.take(self._moves))
 
     def vector_matrices(self) -> Floats:
         """Return the matrices (9, n) of vectors to the scene, as it is then."""
