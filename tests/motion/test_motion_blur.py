@@ -6,12 +6,12 @@ import numpy as np
 import pytest
 from inside import Shutter, compile_scene, generate, make_accelerator, make_sampler, seen_by, seen_with
 from scipy import integrate, stats
-from significance import ALPHA, render, smallest_p
+from significance import ALPHA, render
+from stills import OPTIONS, assert_mean_of_stills
 
 import wavefront as wf
 
 ASKED = {"shutter": Shutter(0, 1)}  # of a compiled scene
-OPTIONS = {"ground": False, "lighting": None, "branches": 1, "reuse": False}
 
 
 def placed(shift=(0, 0, 0), degrees=0.0, axis=1):
@@ -46,31 +46,6 @@ def blob(rings=12):
     return np.stack([v, v * (1, 0.6, 1) + (0.4, 0, 0), v * (0.8, 1.3, 0.8) + (1.2, 0.2, 0)]), np.concatenate(
         faces
     )
-
-
-def strata_means(scene, strata, spp, seed, **options):
-    """The mean of stills at one random time in each of some strata of [0, 1], all with their own seeds."""
-    times = (np.arange(strata) + np.random.default_rng(seed).random(strata)) / strata
-    stills = [
-        render(scene.at(time), spp, seed=1000 * seed + number + 1, **options).rgb.astype(float)
-        for number, time in enumerate(times.tolist())
-    ]
-    return np.mean(stills, 0)
-
-
-def assert_mean_of_stills(scene, runs=8, strata=8, spp=16, still_spp=2, max_error=0.02, **options):
-    """Test that blurred pictures and means of stills have the same mean in blocks and over all."""
-    options = {**OPTIONS, **options}
-    blurred = np.stack(
-        [render(scene, spp, seed=run, shutter=(0, 1), **options).rgb.astype(float) for run in range(runs)]
-    )
-    stills = np.stack([strata_means(scene, strata, still_spp, run + 1, **options) for run in range(runs)])
-    side = blurred.shape[1] // 4
-    cells = [each.reshape(runs, 4, side, 4, side, 3).mean((2, 4)) for each in (blurred, stills)]
-    for level in (cells, [each.mean((1, 2)) for each in cells]):
-        assert smallest_p(*level) > ALPHA
-    error = np.sqrt(sum(each.mean((1, 2, 3)).var(ddof=1) / runs for each in cells))
-    assert error < max_error * stills.mean()
 
 
 def floor():
