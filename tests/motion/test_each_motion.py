@@ -127,3 +127,26 @@ def test_blurred_pictures_are_means_of_stills(motion: str, with_what: str, accel
         **{"runs": 4, "strata": 16, "spp": 64, "still_spp": 4, "accel": accel},
         **{"max_error": 0.08, "max_bounces": 5, **settings},
     )
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("scattering", [0, 0.3])
+def test_inks_that_touch_while_they_move_are_both_known(scattering: float) -> None:
+    """One turns with the other, and one goes along a still one."""
+    inks = [
+        wf.Mesh(
+            half.vertices,
+            half.faces,
+            material=filled(wf.NullSurface(), absorption=ink, scattering=scattering),
+        )
+        for half, ink in (
+            (wf.Box((-0.4, 0, 0), 0.8), (0.2, 2, 4)),
+            (wf.Box((0.4, 0, 0), 0.8), (4, 2, 0.2)),
+        )
+    ]
+    along = wf.Keyframes([0, 1], [placed(), placed(shift=(0, 0.4, 0.3))])
+    for shapes in ([ink.transformed(TURN) for ink in inks], [inks[0], inks[1].transformed(along)]):
+        assert_mean_of_stills(
+            wf.Scene([FLOOR, *shapes], [SKY, wf.PointLight((2, 4, 3), 40)], VIEW),
+            **{"runs": 4, "strata": 16, "spp": 64, "still_spp": 4, "max_bounces": 5},
+        )

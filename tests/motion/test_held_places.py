@@ -198,6 +198,15 @@ THINGS: dict[str, list[wf.Shape]] = {
         )
     ],
     "a drink in a glass": [shape.transformed(HELD) for shape in DRINK],
+    "inks that touch": [
+        wf.Mesh(
+            half.vertices, half.faces, material=filled(wf.NullSurface(), absorption=ink, scattering=0.1)
+        ).transformed(held(TURNED))
+        for half, ink in (
+            (wf.Box((-0.3, 0, 0), 0.6), (0.2, 1, 3)),
+            (wf.Box((0.3, 0, 0), 0.6), (3, 1, 0.2)),
+        )
+    ],
     "spheres": [wf.Spheres(CLOUD, 0.15, colors=(CLOUD + 1) / 2).transformed(held(TURNED))],
     "spheres over time": [wf.Spheres(over_time(CLOUD[:, ::-1], CLOUD), 0.15, times=TIMES)],
     "points over time": [wf.Points(over_time(CLOUD[:, ::-1], CLOUD), 0.15, times=TIMES).transformed(HELD)],
@@ -234,7 +243,13 @@ QUICK = {
     *("moved within what moves", "mirrored map", "normal map on what deforms", "bumps on what deforms"),
     *("brushed metal that deforms", "cut-outs that deform", "shadow catcher", "a drink in a glass"),
     *("absorber that is alone in the middle of the time", "absorber that something comes into"),
-    *("spheres over time", "distance grid", "instances some of which move", "instances of what deforms"),
+    *(
+        "inks that touch",
+        "spheres over time",
+        "distance grid",
+        "instances some of which move",
+        "instances of what deforms",
+    ),
 }
 
 

@@ -87,6 +87,7 @@ class MediaTable:
     light_of: Ints  # (media,) number of the light that samples its emission, -1 for none
     bounds: Doubles  # (2, 3) corners of all that encloses anything, relative to the scene's center
     touching: TouchingFaces | None = None  # None where no shapes that enclose anything lie on each other
+    meet: bool = False  # whether something that encloses anything moves, and may come to lie on another
 
     @property
     def takes_steps(self) -> bool:

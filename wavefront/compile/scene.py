@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from copy import copy
 from dataclasses import field, replace
 from functools import partial
@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from ..accel import Accelerator, Geometry
+from ..accel import Accelerator, Geometry, Placements
 from ..accel.apart import build_apart
 from ..accel.plate import beside_plate
 from ..arrays.soa import soa
@@ -51,7 +51,7 @@ from .program import Facts, Program
 from .scale import check_distance, check_lights, length_factor, scaled_shapes
 from .shape_numbers import ShapeNumbers, number_shapes
 from .specular_surfaces import SpecularSurfaces, find_specular_surfaces
-from .touching import find_touching
+from .touching import find_touching, may_meet
 
 ROULETTE_AFTER = 2  # scattering events, by default
 LARGE = 20_000  # triangles; from here on the order of rays matters more than sorting them costs
@@ -267,6 +267,8 @@ def gather_scene(
     groups, efficacies = numbered.groups(), numbered.efficacies()
     if media is not None:
         holds = (media.entry_of > 0).take(material_of[:once])
+        if motion is not None and placements is not None:
+            media.meet = _may_meet(placed, center, placements, motion, len(meshes) - len(shared), len(curved))
         media.touching = find_touching(triangles[:once], shape_of, material_of[:once], holds)
         # events in media have the numbers from -2 down, so their entries are those before that of a miss
         rows = np.arange(len(user_materials) - len(phases), len(user_materials))
@@ -314,3 +316,30 @@ def gather_scene(
         user_features=asked.get("features", ()),
         features=[],
     )
+
+
+def _may_meet(
+    placed: Sequence[Shape],
+    center: Doubles,
+    placements: Placements,
+    motion: MotionTable,
+    meshes: int,
+    curved: int,
+) -> bool:
+    """Return whether a shape that encloses anything moves, and may come to lie on another such shape.
+
+    Parameters
+    ----------
+    placed
+        Meshes, curved shapes and instances, so many of the first two kinds; the last curved ones move.
+    """
+    low, high = (np.stack([shape.bounds[side] - center for shape in placed]) for side in (0, 1))
+    instances = len(placed) - meshes - curved
+    columns = np.arange(placements.mesh.size)
+    of_column = np.where(columns < instances, meshes + curved + columns, 0)
+    of_column[instances:] = np.arange(meshes + curved - (columns.size - instances), meshes + curved)
+    low[of_column], high[of_column] = placements.low.T, placements.high.T
+    moves = np.zeros(len(placed), np.bool_)
+    moves[of_column] = motion.mover[2:] >= 0
+    holds = np.array([shape.material.encloses for shape in placed], np.bool_)
+    return may_meet(low[holds], high[holds], moves[holds])

@@ -74,6 +74,16 @@ def find_touching(triangles: Floats, shape: Ints, material: Ints, holds: Bools) 
     )
 
 
+def may_meet(low: Doubles, high: Doubles, moves: Bools) -> bool:
+    """Return whether a box that holds all places of what moves meets another one, of boxes (n, 3)."""
+    if len(low) > MOST_SHAPES:
+        return bool(moves.any())
+    room = ROOM * np.maximum(np.abs(low), np.abs(high)).max(initial=0)
+    meets = ((low[:, None] <= high + room) & (high[:, None] >= low - room)).all(2)
+    np.fill_diagonal(meets, False)
+    return bool(meets[moves].any())
+
+
 def _layers(group: Ints, shape: Ints, normal: Doubles) -> Ints:
     """Return the numbers (k,) of the layers of triangles, given their groups, shapes and normals (3, k)."""
     first = np.zeros(group.max() + 1, np.intp)

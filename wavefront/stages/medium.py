@@ -16,7 +16,8 @@ from ..compile.touching import TouchingFaces
 from ..media.base import GlowWeights, MediumRays
 from ..sampling.sampler import Dimension, Sampler
 from ..sampling.steps import StepNumbers
-from .intersect import ShadowRays
+from .interaction import interaction
+from .intersect import ShadowRays, intersect
 
 LEAST_COS = f4(1 / 64)  # between a ray and a normal, for how far it is moved back
 
@@ -172,9 +173,32 @@ def crossings(scene: CompiledScene, surface: SurfaceInteraction) -> NDArray[Any]
     media = scene.media
     assert media is not None
     crossing = media.crossing(surface.material, surface.back_facing)
+    if media.meet:
+        return np.stack([_crossing_beside(scene, surface), crossing])
     if media.touching is None:
         return crossing[None]
     return np.stack([_crossing_of_other(scene, media.touching, surface), crossing])
+
+
+def _crossing_beside(scene: CompiledScene, surface: SurfaceInteraction) -> NDArray[Any]:
+    """Return the changes of stacks (n,) at other surfaces at the places of these, where shapes move.
+
+    A short ray through each place tells them, at the time of the path.
+    """
+    assert scene.media is not None
+    entry = scene.media.crossing(surface.material, surface.back_facing)
+    other = np.zeros_like(entry)
+    lanes = np.flatnonzero((entry != 0) & (surface.prim >= 0))
+    here = surface.take(lanes)
+    before = f4(4) * here.error / np.maximum(np.abs(dot(here.ng, here.wo)), LEAST_COS)
+    rays = Rays(here.point + here.wo * before, -here.wo, here.prim, time=here.time)
+    hits = intersect(scene, rays)
+    met = np.flatnonzero((hits.prim >= 0) & (hits.t < f4(2) * before))
+    beside = interaction(scene, rays.take(met), hits.take(met))
+    crossing = scene.media.crossing(beside.material, beside.back_facing)
+    # a triangle beside another one of a shape is no other surface
+    other[lanes.take(met)] = np.where(crossing == entry.take(lanes.take(met)), ENTRY(0), crossing)
+    return other
 
 
 def _crossing_of_other(
