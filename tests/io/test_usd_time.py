@@ -141,6 +141,28 @@ def test_a_camera_that_moves_is_blurred(tmp_path: Path) -> None:
     np.testing.assert_array_equal(still.rgb, wf.render(scene.at(9), 1, **given).rgb)
 
 
+def test_a_blurred_picture_reads_its_file_once_for_each_time(tmp_path: Path, calls_of: Any) -> None:
+    scene = wf.load(stage(tmp_path, STILL + SLID + CAMERA))
+    scene.add(wf.Environment(1))
+    given: Any = {"size": 4, "progress": False, "workers": 1, "lighting": None}
+    assert scene.reach.shape == (2, 3)  # reads a few times
+    reads = calls_of("wavefront.io.load.read")
+    wf.render(scene, 1, shutter=(1.2, 1.4), **given)
+    assert len(reads) == 9
+    scene.at(float(np.linspace(1.2, 1.4, 9)[3]))
+    assert len(reads) == 9
+    first, second = (named(scene.at(2.7))["ball"] for _ in range(2))
+    assert len(reads) == 10
+    first.material = wf.Mirror(0.5)
+    assert second.material is not first.material
+    assert named(scene.at(2.7))["ball"].material is not first.material
+    for time in np.linspace(1, 3, 12).tolist():
+        scene.at(time)
+    assert len(reads) == 22
+    scene.at(2.7)
+    assert len(reads) == 23  # it was too long ago
+
+
 SPOT = """def SphereLight "spot" (apiSchemas = ["ShapingAPI"])
 {
     float inputs:intensity = 20000

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import TYPE_CHECKING, Any
+from copy import copy
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
@@ -19,6 +20,14 @@ FEW = 5  # times that say how far a scene reaches
 
 if TYPE_CHECKING:
     from .scene import Scene
+
+
+class OfFile(NamedTuple):
+    """The elements of a file at one time."""
+
+    shapes: list[Shape]
+    lights: list[Light]
+    camera: Camera | None
 
 
 class FileMoments:
@@ -40,6 +49,13 @@ class FileMoments:
         elements: list[Any] = [*self._shapes, *self._lights]
         self._known = {key: element for element in elements if (key := _made_of(element)) is not None}
         self._samples: list[Scene] = []
+        self._read_last: dict[
+            float, OfFile
+        ] = {}  # by time: a blurred picture asks twice for each of its times
+
+    def __getstate__(self) -> dict[str, Any]:
+        """Leave out what can be read again."""
+        return {**vars(self), "_samples": [], "_read_last": {}}
 
     def samples(self, scene: Scene) -> list[Scene]:
         """Return the scene at a few times, read once, from which its bounds follow."""
@@ -52,14 +68,27 @@ class FileMoments:
 
         Elements that have not changed are the objects of the scene itself, with their textures and tables.
         """
-        fresh = self._read(time)
         mine = {id(element) for element in (*self._shapes, *self._lights)}  # not kept: a copy has other ids
-        shapes = [self._known.get(_made_of(shape) or "", shape) for shape in fresh.shapes]
-        lights = [self._known.get(_made_of(light) or "", light) for light in fresh.lights]
+        found = self._at(time)
+        shapes = [shape if id(shape) in mine else copy(shape) for shape in found.shapes]
+        lights = [light if id(light) in mine else copy(light) for light in found.lights]
         shapes += [shape.at(time) for shape in scene.shapes if id(shape) not in mine]
         lights += [light.at(time) for light in scene.lights if id(light) not in mine]
         is_of_file = scene.camera is self._camera
-        return shapes, lights, fresh.camera if is_of_file else scene.camera and scene.camera.at(time)
+        return shapes, lights, found.camera if is_of_file else scene.camera and scene.camera.at(time)
+
+    def _at(self, time: float) -> OfFile:
+        """Return what is in the file at a time; what was read for the last few times is not read again."""
+        found = self._read_last.pop(time, None)
+        if found is None:
+            fresh = self._read(time)
+            shapes = [self._known.get(_made_of(shape) or "", shape) for shape in fresh.shapes]
+            lights = [self._known.get(_made_of(light) or "", light) for light in fresh.lights]
+            found = OfFile(shapes, lights, fresh.camera)
+        self._read_last[time] = found
+        if len(self._read_last) > KEYS:
+            del self._read_last[next(iter(self._read_last))]  # the oldest one
+        return found
 
     def camera_between(self, scene: Scene, begin: float, end: float) -> Camera | None:
         """Return the camera of a scene as it moves between two times, s: that of the file by its places then.
