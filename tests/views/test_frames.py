@@ -82,6 +82,20 @@ def test_frames_of_a_function_of_time() -> None:
     assert bits(colored) == bits(wf.render(wf.Box((0, 0, 0), 1), 4, material="gold", **SMALL))
 
 
+def test_a_function_may_change_what_it_returned_before() -> None:
+    box, still = wf.Box((0, 0, 0), 1), wf.Box((0, -2, 0), 1)
+    scene = wf.Scene([box, still], [wf.Environment(1)])
+    corners = box.vertices.copy()
+
+    def lifted(time: float) -> wf.Scene:
+        box.vertices[:, 1] = corners[:, 1] + time
+        return scene
+
+    frames = [bits(each) for each in wf.render_frames(lifted, [0, 1], 2, **SMALL)]
+    assert frames == [bits(wf.render(lifted(each), 2, **SMALL)) for each in (0, 1)]
+    assert frames[0] != frames[1]
+
+
 def test_a_given_camera_moves_too() -> None:
     path = wf.Keyframes([0, 2], [moved(-1, 0, 5), moved(1, 0, 5)])
     camera = wf.Camera.from_matrix(path, 30, size=(20, 16))

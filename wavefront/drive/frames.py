@@ -221,13 +221,16 @@ def _one_by_one(
 ) -> Iterator[Image]:
     """Render frames one after the other; a session goes on where only the camera has moved."""
     before: Scene | None = None
+    # what a user's function returns may be the same objects, changed in place
+    own = isinstance(getattr(scene_at, "__self__", None), Scene)
     with ExitStack() as stack:
         session: Session | None = None
         for time, settings in jobs:
             scene = _scene_at(scene_at, time, settings)
             camera = settings.get("camera") or scene.camera
             if (
-                session is not None
+                own
+                and session is not None
                 and before is not None
                 and _goes_on(session, before, scene, camera, settings)
             ):
