@@ -202,6 +202,9 @@ def test_another_motion_is_refused(tmp_path: Path) -> None:
         "instance": wf.Scene([FLOOR, BOX.transformed(way(1, 0.2, 0.5, degrees=71))], [LAMP], VIEW),
         "deforming": wf.Scene([FLOOR, wf.Mesh(late, BOX.faces, times=[0, 1], smooth=True)], [LAMP], VIEW),
         "light": wf.Scene([FLOOR, BOX], [LAMP.transformed(way(1, 0.2, 0.5, degrees=71))], VIEW),
+        "sky": wf.Scene(
+            [FLOOR, BOX], [DOME.transformed(GOES), CLEAR.transformed(way(1, 0.2, 0.5, degrees=71))], VIEW
+        ),
     }
     for name, other in others.items():
         drawn(name, 1, checkpoint=tmp_path / name)

@@ -38,8 +38,8 @@ def radiance_from(light, direction):
 def test_each_ray_sees_the_sky_of_its_time(name):
     """Those of the camera, which see a backdrop, and those that a mirror has sent on."""
     ball = wf.Sphere((0, 0, 0), 1, material=wf.Mirror())
-    view = wf.Camera.look_at((0, 0.5, 4), (0, 0.3, 0), fov=45, size=8)
-    steps = list(wf.trace(wf.Scene([ball], SHOWN[name], view), shutter=(0.2, 0.8)))
+    view = wf.Camera.look_at((0, 0.5, 4), (0, 0.3, 0), fov=45, size=8).replace(rolling_shutter=0.1)
+    steps = list(wf.trace(wf.Scene([ball], SHOWN[name], view), shutter=(0.2, 0.7)))
     due, reflected = np.zeros_like(steps[-1].light), 0
     for step in (each for each in steps if each.stage == "intersect"):
         missed = np.flatnonzero(step.hits.prim < 0)

@@ -11,6 +11,7 @@ from inside import (
     ConstantEnvironment,
     Dielectric,
     Diffuse,
+    Environment,
     PointLight,
     SphereLights,
     TriangleLights,
@@ -54,6 +55,16 @@ def test_chi_square_pools_cells_below_five():
 
 def test_chi_square_rejects_what_cannot_happen():
     assert chi2.chi_square(np.array([10, 90]), np.array([0.0, 100]))[2] < 1e-3
+
+
+def test_an_error_of_the_quadrature_is_no_loss_of_samples():
+    """All samples have a point, while the cells cover but 0.99991 of the density."""
+    rng, n = np.random.default_rng(1), 1 << 20
+    pilot, points = (rng.random((2, count), F4) for count in (1 << 14, n))
+    report = testing.Report("even")
+    even = lambda p: np.full(p.shape[1], 1 - 9e-5, F4)  # noqa: E731
+    check_density(report, "", CHARTS["square"], pilot, points, n, even, 1e-4)
+    report.raise_if_failed()
 
 
 def test_a_small_part_of_a_density_is_integrated_if_any_sample_is_there():
@@ -351,6 +362,12 @@ LIGHTS = {
 @pytest.mark.parametrize("name", LIGHTS)
 def test_light(name):
     testing.check_light(LIGHTS[name], points=[[0, 0, 0], [-3, 2, -1]], samples=50_000)
+
+
+def test_light_of_a_picture_of_great_contrast():
+    """The rounding of directions changes the radiance of its dark places by more than a 10,000th."""
+    picture = np.random.default_rng(1).random((1, 8, 3)) ** 60
+    testing.check_light(Environment(picture), points=[[0, 0, 0]], samples=20_000)
 
 
 class WrongSolidAngle(SphereLights):

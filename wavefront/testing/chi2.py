@@ -68,12 +68,16 @@ def chi_square(observed: Ints, expected: Doubles) -> tuple[float, int, float]:
     return statistic, max(freedom, 0), p if stray == 1 else min(1.0, 2 * min(p, stray))
 
 
-def _chi_square_p(observed: Ints, expected: Doubles, missing: int, lost: float) -> float:
-    """Return the p-value of χ² over cells, row sums and column sums; sums reveal a slope that cells hide."""
+def _chi_square_p(observed: Ints, integrals: Doubles) -> float:
+    """Return the p-value of χ² over cells, row sums and column sums; sums reveal a slope that cells hide.
+
+    It is that of the samples which have a point. How many these are is the integral of the density, whose
+    error by quadrature may be many times the square root of the few that have none.
+    """
+    expected = integrals * (observed.sum() / max(float(integrals.sum()), 1e-300))
     counts, means = observed.reshape(ROWS, COLUMNS), expected.reshape(ROWS, COLUMNS)
     views = [(counts.ravel(), means.ravel()), (counts.sum(1), means.sum(1)), (counts.sum(0), means.sum(0))]
-    p = [chi_square(np.append(o, missing), np.append(e, lost))[2] for o, e in views]
-    return min(1.0, 3 * min(p))
+    return min(1.0, 3 * min(chi_square(o, e)[2] for o, e in views))
 
 
 def binomial_p(count: int, trials: int, probability: float) -> float:
@@ -113,11 +117,9 @@ def check_density(
     integrator = DensityIntegrator(density, chart, on_square.take(guide, 1), height)
     expected, unresolved = integrator.cells(cells)
     integral = float(expected.sum())
-    missing = total - points.shape[1]
     fraction = points.shape[1] / total
     noise = math.sqrt(fraction * (1 - fraction) / total)
     report.near("integral of pdf", where, integral, fraction, 1e-4 + 4.5 * noise + unresolved)
     if singular > 0:
         report.at_most("sum of probabilities", where, singular + integral, 1 + 1e-4 + unresolved)
-    lost = max(1 - integral, 0.0) * total
-    report.significant("chi-square", where, _chi_square_p(observed, expected * total, missing, lost), alpha)
+    report.significant("chi-square", where, _chi_square_p(observed, expected), alpha)
