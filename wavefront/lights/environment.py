@@ -89,6 +89,8 @@ class Environment(Parametrized, FarLight):
         (3, 1) W·sr⁻¹·m⁻²; of an image, the mean over all directions.
     backdrop
         The background that the camera sees, an `Environment`; None if that is the light itself.
+    rotation
+        (3, 3) to world space from the environment's own; of one that turns, at its start.
 
     Notes
     -----
@@ -169,7 +171,7 @@ class Environment(Parametrized, FarLight):
 
     @property
     def rotation(self) -> Doubles:
-        """(3, 3) rotation from the environment's space to world space; of one that turns, at its start."""
+        """(3, 3) to world space from the environment's own; of one that turns, at its start."""
         return np.eye(3) if self._transform is None else self._transform
 
     @property
