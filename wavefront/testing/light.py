@@ -24,7 +24,6 @@ from .chi2 import check_density
 from .report import PILOT, Report
 
 ARRAYS = 100  # samples of which shapes and types are checked
-DARK = 0.1  # of the mean radiance of samples: what is darker is compared as if it were so bright
 
 
 def check_light(
@@ -166,7 +165,7 @@ def _check_light_samples(
     # Rays to samples on the edge of a light may miss it, so a few lanes may differ.
     ratio = np.abs(pdf - drawn.pdf[possible]) > 1e-3 * drawn.pdf[possible]
     report.at_most("sample pdf ≠ pdf_li", where, float(ratio.mean()), 1e-3)
-    # That of wi moves it within an image, where what is dark may lie beside what is bright.
-    size = np.maximum(le, max(DARK * float(le.mean()), 1e-20))
-    differs = (np.abs(le - drawn.radiance[:, possible]) > 1e-4 * size).any(0)
+    # Rounding of wi moves it within an image, where what is dark may lie beside what is bright.
+    scale = np.maximum(le, max(float(le.mean()), 1e-20))
+    differs = (np.abs(le - drawn.radiance[:, possible]) > 1e-4 * scale).any(0)
     report.at_most("radiance ≠ le", where, float(differs.mean()), 1e-3)
