@@ -495,3 +495,28 @@ def Mesh "bar" {
     alpha = image.layers["alpha"].astype(float).reshape(64, 16)
     expected = coverage(np.linspace(-1, 7, 17), 1.1, 3.7)
     assert_columns((alpha.mean(0), alpha.std(0, ddof=1) / 8), expected)
+
+
+@pytest.mark.parametrize("size", [1e-12, 1e15])
+def test_meshes_of_any_size_deform_alike(size):
+    """Lengths of very small and very large scenes are traced in another unit."""
+    corner = np.array([(-1, 0, 0), (1, 0, 0), (0, 1, 0)], float)
+
+    def alpha(size):
+        mesh = wf.Mesh(np.stack([corner, corner + np.array([0.5, 0.3, 0])]) * size, [(0, 1, 2)], times=[0, 1])
+        camera = wf.Camera.look_at((0, 0.3 * size, 4 * size), (0, 0.3 * size, 0), fov=40, size=12)
+        scene = wf.Scene([mesh], wf.Environment(1), camera)
+        return render(scene, 4, shutter=(0, 1), aovs="alpha", **OPTIONS).layers["alpha"]
+
+    np.testing.assert_allclose(alpha(size).mean(), alpha(1).mean(), rtol=0.01)
+    assert alpha(size).max() == 1
+
+
+def test_where_smooth_meshes_are_over_time_needs_no_normals(monkeypatch):
+    """These take longer than all else; an instance of the mesh needs none, either."""
+    vertices, faces = blob()
+    mesh, computed = wf.Mesh(vertices, faces, times=[0, 0.3, 1], smooth=True), []
+    scene = wf.Scene([mesh, wf.Instance(mesh, placed((2, 0, 0)))])
+    monkeypatch.setattr(wf.Mesh, "compute_normals", lambda *given: computed.append(given))
+    np.testing.assert_allclose(scene.reach[1], [1.2 + 0.48 + 2, 0.98, 0.6], atol=0.01)
+    assert not computed

@@ -20,6 +20,7 @@ from ..motion.shutter import Shutter
 from ..motion.steps import Matrices
 from ..scene import Scene
 from ..shapes import Instance, Mesh, Shape, Sphere, Spheres
+from ..shapes.instance import unshaded
 from ..shapes.transform import is_even, points_by
 from .materials import attributes_read
 from .motion import Exposed, Mover
@@ -50,7 +51,8 @@ def exposed_scene(scene: Scene, shutter: Shutter | None) -> Exposed:
         return Exposed(moment, changed=moment.changed)
     still, moving = copy(scene), [shape for shape in scene.shapes if _moves(shape, shutter)]
     times = np.linspace(shutter.begin, shutter.end, TIMES).tolist()
-    boxes = [Scene([shape.at(time) for shape in moving]).bounds for time in times if moving]
+    plain = [unshaded(shape) for shape in moving]
+    boxes = [Scene([shape.at(time) for shape in plain]).bounds for time in times if plain]
     keys = np.concatenate([_inside(each.keys, shutter) for each in (*moving, *scene.lights)])
     exposed, forms = Exposed(still, shutter, boxes=tuple(boxes), keys=np.unique(keys)), _Forms(shutter)
     shapes = [shape.at(shutter.middle) for shape in scene.shapes]

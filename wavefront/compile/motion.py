@@ -212,6 +212,7 @@ def deforming_rows(
     first: int,
     shutter: Shutter,
     drift: Doubles,
+    ratio: float,
     vectors: Sequence[str] = (),
 ) -> DeformingRows:
     """Return the triangles of a mesh that deforms while a shutter is open.
@@ -226,12 +227,14 @@ def deforming_rows(
         Row of its first triangle in the scene's tables.
     drift
         (3,) way of the middle of its vertices over the whole time, which is taken off.
+    ratio
+        By which the lengths of `mesh` are multiplied.
     vectors
         Attributes along the surface that materials read.
     """
     times = _times_of(keys, shutter)
     middle = still.bounds.mean(0)
-    meshes = [mesh.at(time) for time in times.tolist()]
+    meshes = [mesh.at(time).lengths_times(ratio) for time in times.tolist()]
     fractions = (times - shutter.middle) / (shutter.end - shutter.begin)
     corners = [
         (form.vertices - middle - drift * fraction).take(mesh.faces, 0).astype(f4)
@@ -352,11 +355,11 @@ class _MotionColumns:
         """Add an instance of a mesh, whose first triangle has a row in the scene's tables."""
         drift, box = np.zeros(3), _half_box(mesh)
         if moving.mesh is not None:
-            whole = moving.mesh if factor == unit else moving.mesh.lengths_times(factor / unit)
-            drift = _drift(whole, shutter)
+            ratio = factor / unit
+            drift = _drift(moving.mesh, shutter) * ratio
             if id(mesh) not in self.deforming:
                 self.deforming[id(mesh)] = deforming_rows(
-                    whole, mesh, moving.keys, row, shutter, drift, self.vectors
+                    moving.mesh, mesh, moving.keys, row, shutter, drift, ratio, self.vectors
                 )
             box = self.deforming[id(mesh)].box
         traced = _traced(moving.matrices, mesh.bounds.mean(0), drift, shutter, center, factor, unit)
@@ -405,7 +408,8 @@ def _unit_of(scaled: Instance, original: Any) -> float:
 
 def _drift(mesh: Mesh, shutter: Shutter) -> Doubles:
     """Return the way (3,) of the middle of a mesh that deforms, while a shutter is open."""
-    return np.asarray(mesh.at(shutter.end).vertices.mean(0) - mesh.at(shutter.begin).vertices.mean(0))
+    begin, end = (mesh.unshaded().at(time).vertices.mean(0) for time in (shutter.begin, shutter.end))
+    return np.asarray(end - begin)
 
 
 def _traced(

@@ -22,7 +22,7 @@ TOLERATED = 2.0**-12  # the same where steps are not enough; more is warned of
 LEAST_SCALE = 1e-9  # of what a motion flattens, relative to its greatest
 FIRST_STEPS = 16  # that are tried first, if not fewer are allowed
 SHORTEST = 2.0**-20  # step, relative to the whole time: a jump takes this long
-MOST_LINES = 1 << 9  # steps along lines; of parabolas fewer are enough, but they take longer
+MOST_LINES = 1 << 9  # steps along lines of all motions; of parabolas fewer are enough, but they take longer
 MOST_STEPS = 1 << 16
 MOST_MATRICES = 1 << 17  # of all motions; many motions have fewer steps
 NODES = np.array([0, 0.5, 1])  # of a step, where its parabolas have the numbers of the motion
@@ -106,9 +106,11 @@ class Motions:
         first = first[(first >= 0) & (first <= 1)]
         if first.size > room:
             first = np.arange(FIRST_STEPS + 1) / FIRST_STEPS
-        lines = _divided(motions, begin, end, first, scale, min(room, MOST_LINES), True)
-        if np.concatenate([part.error for part in lines], 1).max() <= ERROR:
-            return cls._joined(lines, begin, end, True)
+        few = MOST_LINES // len(motions)
+        if first.size <= few:
+            lines = _divided(motions, begin, end, first, scale, few, True)
+            if np.concatenate([part.error for part in lines], 1).max() <= ERROR:
+                return cls._joined(lines, begin, end, True)
         return cls._joined(_divided(motions, begin, end, first, scale, room, False), begin, end, False)
 
     @classmethod

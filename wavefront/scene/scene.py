@@ -23,7 +23,7 @@ from ..lights import Environment, Light
 from ..media import BaseMedium
 from ..motion import Moving
 from ..shapes import Group, Instance, Mesh, PrimitiveArray, Shape
-from ..shapes.instance import instance_bounds, instance_hulls, kinds_of
+from ..shapes.instance import instance_bounds, instance_hulls, kinds_of, unshaded
 from .file_moments import FileMoments
 from .html import scene_html
 from .loss import Loss
@@ -339,7 +339,9 @@ class Scene(Answers):
             return source.file_moments.samples(source)
         if not source._moving.any:
             return [self]
-        return (source.at(time) for time in np.linspace(*source._span(), MOMENTS))  # not all at once
+        plain = copy(source)
+        plain._shapes, plain._moments = Shapes([unshaded(shape) for shape in source.shapes]), None
+        return (plain.at(time) for time in np.linspace(*source._span(), MOMENTS))  # not all at once
 
     @property
     def reach(self) -> Doubles:

@@ -338,6 +338,16 @@ def kinds_of(shapes: Sequence[S]) -> tuple[list[S], Ints]:
     return [first[key] for key in numbers], kind
 
 
+def unshaded(shape: Shape) -> Shape:
+    """Return a shape that is at the same places at all times, but need not have normals there."""
+    if isinstance(shape, Mesh):
+        return shape.unshaded()
+    if isinstance(shape, Instance) and shape.mesh.unshaded() is not shape.mesh:
+        shape = copy(shape)
+        shape.mesh = shape.mesh.unshaded()
+    return shape
+
+
 def instance_bounds(instances: Sequence[Instance]) -> Doubles:
     """Return the `bounds` of instances, (n, 2, 3); instances of one mesh are computed together."""
     out, matrices = np.empty((len(instances), 2, 3)), transforms_of(instances)

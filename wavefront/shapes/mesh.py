@@ -306,6 +306,15 @@ class Mesh(ColoredShape):
             mesh.compute_normals(self._smooth)
         return mesh
 
+    def unshaded(self) -> Self:
+        """Return the mesh without the normals that are computed for each of its forms."""
+        if self._rest is None or self._rest._smooth is None:
+            return self
+        plain = copy(self)
+        plain._rest = copy(self._rest)
+        plain._rest._smooth = None
+        return plain
+
     def _transformed(self, matrix: ArrayLike) -> Self:
         placing = finite_array(f"{self.name}: transform matrix", matrix, (4, 4))
         mesh = copy(self)
