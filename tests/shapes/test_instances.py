@@ -777,4 +777,4 @@ def test_a_scene_of_many_instances_is_compiled_without_a_loop_over_them() -> Non
         return calls(lambda: wf.Session(scene, 1, **settings).close())
 
     compiled(1000)  # warm
-    assert compiled(2000) - compiled(1000) <= 60 * 1000  # by C functions, most of them
+    assert compiled(2000) - compiled(1000) <= 25 * 1000  # of C functions, most of them

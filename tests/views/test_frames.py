@@ -171,6 +171,17 @@ def test_the_tree_of_what_stands_still_is_kept(
         np.testing.assert_allclose(frames[1].rgb, joined.rgb, rtol=1e-4)
 
 
+def test_moments_of_a_scene_share_its_trees_as_in_the_viewer(
+    calls_of: Any, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("wavefront.accel.apart.LEAST", 100)
+    built = calls_of("wavefront.accel.cache.make_accelerator")
+    scene = beside_a_wall()
+    for each in (0, 1.25, 0.5):
+        wf.Session(scene.at(each), 1, **QUIET).close()
+    assert [len(call.args[0].triangles) for call in built] == [128, 12, 12, 12]
+
+
 def test_files_are_read_once(tmp_path: Path, calls_of: Any) -> None:
     path = animated(tmp_path / "a.gltf")
     reads = calls_of("wavefront.io.load.read")

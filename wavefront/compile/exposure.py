@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from copy import copy
-from itertools import accumulate
+from itertools import accumulate, compress
 from operator import is_not
 from typing import Any
 
@@ -20,7 +20,7 @@ from ..motion.shutter import Shutter
 from ..motion.steps import Matrices
 from ..scene import Scene
 from ..shapes import Instance, Mesh, Shape, Sphere, Spheres
-from ..shapes.instance import unshaded
+from ..shapes.instance import of_class, unshaded
 from ..shapes.transform import is_even, points_by
 from .materials import attributes_read
 from .motion import Exposed, Mover
@@ -82,8 +82,7 @@ def middle_of(exposed: Exposed, low: Doubles, high: Doubles, scale: float) -> tu
     middle, half = (low + high) / 2, (high - low) / 2
     if exposed.changed is None or not exposed.changed.any():
         return middle, half
-    pairs = zip(exposed.scene.shapes, exposed.changed.tolist(), strict=True)
-    still = [shape for shape, changes in pairs if not changes and isinstance(shape, Mesh)]
+    still = of_class(compress(exposed.scene.shapes, (~exposed.changed).tolist()), Mesh)
     if not are_many(sum(len(mesh.faces) for mesh in still)):
         return middle, half
     boxes = np.stack([mesh.bounds for mesh in still]) * scale

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections import Counter
 from collections.abc import Collection, Sequence
 from itertools import compress
 
@@ -11,10 +10,10 @@ import numpy as np
 from ..accel import Placements
 from ..arrays.soa import soa
 from ..arrays.state import SoA
-from ..arrays.vec import Doubles, Floats, Ints, f4
+from ..arrays.vec import Bools, Doubles, Floats, Ints, f4
 from ..core.errors import SceneError
 from ..shapes import CurvedShape, Instance, Mesh, Shape
-from ..shapes.instance import instance_bounds, kinds_of, transforms_of
+from ..shapes.instance import by_mesh, instance_bounds, kinds_of, of_class, transforms_of
 from .curved import order_by_kind
 from .overlaps import overlapping_instances
 
@@ -92,29 +91,25 @@ def sort_shapes(
 
 def _kept_instances(shapes: Sequence[Shape], most_copies: int) -> set[int]:
     """Return the identities of the instances that share a mesh: see `sort_shapes`."""
-    instances = [shape for shape in shapes if isinstance(shape, Instance)]
-    if sum(len(instance.mesh.faces) for instance in instances) <= most_copies:
+    instances = of_class(shapes, Instance)
+    groups = by_mesh(instances)
+    if sum(len(group) * len(instances[group[0]].mesh.faces) for group in groups) <= most_copies:
         return set()
-    copies = Counter(id(instance.mesh) for instance in instances)
-    shareable = _shareable(instances)
-    candidates = [
-        instance for instance in instances if copies[id(instance.mesh)] > 1 and id(instance) in shareable
-    ]
-    left = {id(instance) for instance in candidates}
-    meshes = [instance.to_mesh() for instance in instances if id(instance) not in left]
-    meshes += [shape for shape in shapes if isinstance(shape, Mesh)]
-    return left - overlapping_instances(candidates, meshes)
+    kept = _shareable(instances)
+    for group in groups:
+        kept[group] &= len(group) > 1
+    candidates = list(compress(instances, kept.tolist()))
+    meshes = [instance.to_mesh() for instance in compress(instances, (~kept).tolist())]
+    meshes += of_class(shapes, Mesh)
+    return set(map(id, candidates)) - overlapping_instances(candidates, meshes)
 
 
-def _shareable(instances: Sequence[Instance]) -> set[int]:
-    """Return the identities of the instances that emit no light and are not very skewed."""
-    if not instances:
-        return set()
+def _shareable(instances: Sequence[Instance]) -> Bools:
+    """Return a mask (n,) of the instances that emit no light and are not very skewed."""
     scales = np.linalg.svd(transforms_of(instances)[:, :3, :3], compute_uv=False)
     kinds, kind = kinds_of(instances)
-    dark = np.array([shape.emission is None for shape in kinds])[kind]
-    fits = (scales[:, 0] <= SKEW * scales[:, 2]) & dark
-    return set(map(id, compress(instances, fits.tolist())))
+    dark = np.array([shape.emission is None for shape in kinds], np.bool_)[kind]
+    return (scales[:, 0] <= SKEW * scales[:, 2]) & dark
 
 
 def own_frame(mesh: Mesh) -> Doubles:

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from copy import copy
+from operator import attrgetter
 from typing import Any
 
 import numpy as np
@@ -20,6 +21,7 @@ from ..lights import Light
 from ..materials import Material
 from ..media import BaseMedium
 from ..shapes import CurvedShape, Instance, Mesh, Shape
+from ..shapes.instance import of_class
 
 # Radii of scenes that are not scaled. The upper limit is nearer: no part of a scene is larger than it.
 MIN_RADIUS, MAX_RADIUS = 2.0**-20, 2.0**24
@@ -39,7 +41,7 @@ def scaled_shapes(shapes: Sequence[Shape], factor: float) -> list[Shape]:
     Instanced meshes are traced in their own coordinates, so each has its own factor, which the transforms
     cancel. Shared meshes, materials and media stay shared.
     """
-    placed = {id(shape.mesh): shape.mesh for shape in shapes if isinstance(shape, Instance)}
+    placed = {id(mesh): mesh for mesh in map(attrgetter("mesh"), of_class(shapes, Instance))}
     factors = {key: length_factor(_radius(mesh)) for key, mesh in placed.items()}
     if factor == 1 and all(mesh_factor == 1 for mesh_factor in factors.values()):
         return list(shapes)

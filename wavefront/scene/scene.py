@@ -23,7 +23,7 @@ from ..lights import Environment, Light
 from ..media import BaseMedium
 from ..motion import Moving
 from ..shapes import Group, Instance, Mesh, PrimitiveArray, Shape
-from ..shapes.instance import instance_bounds, instance_hulls, kinds_of, unshaded
+from ..shapes.instance import instance_bounds, instance_hulls, kinds_of, of_class, unshaded
 from .file_moments import FileMoments
 from .html import scene_html
 from .loss import Loss
@@ -481,8 +481,9 @@ class Scene(Answers):
 
 def _boxes_of(shapes: Sequence[Shape]) -> Doubles:
     """Return the bounds (n, 2, 3) of shapes, in any order."""
-    instances = [shape for shape in shapes if isinstance(shape, Instance)]
-    alone = [shape.bounds for shape in shapes if not isinstance(shape, Instance)]
+    instances = of_class(shapes, Instance)
+    others = () if len(instances) == len(shapes) else shapes
+    alone = [shape.bounds for shape in others if not isinstance(shape, Instance)]
     return np.concatenate([np.array(alone).reshape(-1, 2, 3), instance_bounds(instances)])
 
 
