@@ -30,7 +30,7 @@ LOW_LIGHT = wf.Rectangle((-0.5, 0.3, 0.5), (1, 0, 0), (0, 0.02, 0.5), emission=6
 SKY = wf.Environment(rng.random((16, 32, 3)).astype(np.float32))
 SPOTS = [wf.SpotLight((k - 2, 2, 1), 4, target=(0, 0, 0), angle=50) for k in range(5)]
 COLORS = wf.Texture((rng.random((16, 16, 3)) * 255).astype(np.uint8))
-CAMERA = wf.Camera.look_at((0.5, 1.5, 4.0), (0, 0.4, 0), fov=40, size=(32, 24))
+CAMERA = wf.Camera.look_at((0.5, 1.5, 4.0), (0, 0.4, 0), fov=40, size=(24, 18))
 hashes = {
     "numpy's own sine": hashlib.sha256(np.sin(rng.random(10_000, np.float32) * 9).tobytes()).hexdigest()
 }

@@ -493,8 +493,9 @@ def random_solids(rng: np.random.Generator, crowded: bool) -> list[Solid]:
     return out
 
 
-@pytest.mark.first(8)
-@pytest.mark.parametrize("seed", range(40))
+@pytest.mark.first(4)
+# the first four have each integrator, both accelerators, and many solids or few
+@pytest.mark.parametrize("seed", sorted(range(40), key=lambda seed: seed not in (0, 7, 9, 14)))
 def test_random_absorbers(seed: int, monkeypatch) -> None:
     """Against the optical depth of what sensors see, and pictures with a table in every case."""
     rng = np.random.default_rng(seed)

@@ -62,6 +62,7 @@ def blas_threads() -> set[int]:
 
 
 @pytest.mark.parametrize("executor", NAMES)
+@pytest.mark.first(1)
 def test_blas_has_its_threads_back_after_a_render(executor: str, expected: bytes) -> None:
     """Although a thread of the render's own ends it, and the caller has set their number."""
     with threadpool_limits(3, "blas"):

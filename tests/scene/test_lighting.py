@@ -309,6 +309,7 @@ def test_the_key_light_is_left_of_the_camera_that_is_given(origin) -> None:
 
 
 @pytest.mark.parametrize("name", PRESETS)
+@pytest.mark.first(2)
 def test_the_ground_has_no_edge(name: str) -> None:
     """Where nothing throws a shadow on it, it is as bright as the environment that it hides."""
     scene = wf.Scene([wf.Sphere((x, 0, 0), 0.01) for x in (-1, 1)])
@@ -319,6 +320,7 @@ def test_the_ground_has_no_edge(name: str) -> None:
 
 
 @pytest.mark.parametrize("name", PRESETS)
+@pytest.mark.first(2)
 def test_the_ground_catches_the_shadow(name: str) -> None:
     scene = ball()
     bare, grounded = (render(scene, lighting=name, ground=ground) for ground in (False, True))
@@ -326,6 +328,7 @@ def test_the_ground_catches_the_shadow(name: str) -> None:
 
 
 @pytest.mark.parametrize("background", ["transparent", (0.2, 0.4, 0.8), None])
+@pytest.mark.first(2)
 def test_of_a_ground_the_shadow_alone_is_seen(background: Any) -> None:
     """Its opacity is that of a catcher: below the ball, and not beside it; the light on the ball stays."""
     settings: dict[str, Any] = {"background": background, "progress": False, "spp": 32, "size": (32, 32)}

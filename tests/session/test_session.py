@@ -282,6 +282,7 @@ def test_nothing_is_left(executor: str, end: str) -> None:
 
 
 @pytest.mark.parametrize("executor", EXECUTORS)
+@pytest.mark.first(1)
 def test_idle_workers_end_and_start_again(executor: str, monkeypatch: pytest.MonkeyPatch) -> None:
     """Outside of a block, after a time; what they have done is not lost."""
     assert pool.IDLE_TIMEOUT == 10

@@ -360,6 +360,7 @@ LIGHTS = {
 
 
 @pytest.mark.parametrize("name", LIGHTS)
+@pytest.mark.first(3)
 def test_light(name):
     testing.check_light(LIGHTS[name], points=[[0, 0, 0], [-3, 2, -1]], samples=50_000)
 
