@@ -449,7 +449,7 @@ def test_plastic_by_default():
 
 def test_a_texture_of_roughness_finds_the_boundary_between_rows():
     wo, wi = pairs()
-    for roughness in (0.5, 0.57, 0.98):
+    for roughness in (0.57, 0.98):
         rough, textured = Plastic(0.6, roughness), Plastic(0.6, roughness)
         vars(textured).update(_one=None)
         assert textured.f(wo, wi) == pytest.approx(rough.f(wo, wi), rel=3e-3)

@@ -30,9 +30,7 @@ def directions(n, seed=0):
 def test_contract():
     """Smooth glass absorbs nothing; of rough glass the checker has no index for each channel."""
     check_bsdf(Dielectric(INDICES), samples=10_000, angles=(20.0, 75.0), reciprocal=False, albedo=(1, 1))
-    check_bsdf(
-        Dielectric(INDICES, 0.4), samples=10_000, angles=(20.0, 75.0), reciprocal=False, albedo=(0, 1.6)
-    )
+    check_bsdf(Dielectric(INDICES, 0.4), samples=10_000, angles=(60.0,), reciprocal=False, albedo=(0, 1.6))
 
 
 @pytest.mark.parametrize("inside", [False, True])

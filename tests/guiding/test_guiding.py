@@ -286,7 +286,7 @@ mixtures = pytest.mark.parametrize(
 @pytest.mark.first(1)
 def test_the_mixture_has_its_pdf(bsdf: wf.Bsdf) -> None:
     """By the public checks of a BSDF: pdf against samples, weight = f·cos/pdf, and albedo."""
-    wf.testing.check_bsdf(Guided(bsdf, random_table(share=0.4)), samples=25_000, angles=(0, 75))
+    wf.testing.check_bsdf(Guided(bsdf, random_table(share=0.4)), samples=25_000, angles=(60,))
 
 
 @mixtures

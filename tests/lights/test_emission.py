@@ -455,7 +455,7 @@ def test_spheres_shine_by_their_colors() -> None:
     light = compiled(balls).lights
     assert light.kinds[0].radiance.T.tolist() == (0.5 * np.array(colors)).tolist()
     full, naive = (
-        repeat(lit(balls), spp, integrator=name, max_bounces=2)
+        repeat(lit(balls), spp, 10, integrator=name, max_bounces=2)
         for name, spp in (("full", 16), ("naive", 256))
     )
     assert_same_images(full, naive, 0.01)

@@ -121,7 +121,11 @@ def test_the_steps_of_the_tutorial_build_the_tracer():
     assert len([line for line in lines if line and line[0] != "#"]) <= 150
 
 
-def test_the_tracer_of_the_tutorial_is_right(tracer):
+@pytest.mark.parametrize(
+    ("name", "parts", "limit"),
+    [("full", 24, 0.03), pytest.param("naive", 64, 0.09, marks=pytest.mark.slow)],
+)
+def test_the_tracer_of_the_tutorial_is_right(name, parts, limit, tracer):
     """All its estimators agree with the library, in a room without the glass, whose caustic is noisy."""
     tracer.KIND[8] = tracer.MATTE
     kinds = {tracer.MIRROR: wf.Mirror, tracer.MATTE: wf.Diffuse}
@@ -132,13 +136,12 @@ def test_the_tracer_of_the_tutorial_is_right(tracer):
         )
     ]
     camera = wf.Camera.look_at(tracer.EYE, tracer.TARGET, fov=60, size=(16, 12))
-    for estimator, parts, limit in ((tracer.full, 24, 0.03), (tracer.naive, 64, 0.09)):
-        means = [tracer.render(estimator, 16, 12, 2, seed).mean() for seed in range(parts)]
-        exact = wf.render(wf.Scene(balls, camera=camera), 512, max_bounces=5, progress=False).rgb.mean()
-        error = np.std(means, ddof=1) / np.sqrt(parts)
-        # Student's t with 23 degrees of freedom is beyond 4.5 with a probability of 2e-4
-        assert abs(np.mean(means) - exact) < 4.5 * error
-        assert error < limit * exact
+    means = [tracer.render(getattr(tracer, name), 16, 12, 2, seed).mean() for seed in range(parts)]
+    exact = wf.render(wf.Scene(balls, camera=camera), 512, max_bounces=5, progress=False).rgb.mean()
+    error = np.std(means, ddof=1) / np.sqrt(parts)
+    # Student's t with 23 degrees of freedom is beyond 4.5 with a probability of 2e-4
+    assert abs(np.mean(means) - exact) < 4.5 * error
+    assert error < limit * exact
 
 
 def test_a_mirror_of_the_tutorial_cancels_the_cosine(tracer):

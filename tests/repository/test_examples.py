@@ -83,7 +83,7 @@ def test_the_overview_lists_all_examples():
     assert sorted(listed) == sorted(SHAPES)
 
 
-QUICK = ["cornell_box", "course_spheres", "cuboids", "depth_of_field", "spheres"]
+QUICK = ["cornell_box", "course_spheres", "cuboids", "depth_of_field"]
 
 
 @pytest.mark.parametrize("name", [*QUICK, *sorted(SHAPES.keys() - {"furnace", *QUICK})])

@@ -4,7 +4,7 @@ import itertools
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 from inside import (
     BLOCK,
@@ -24,6 +24,7 @@ from scipy import stats
 import wavefront.sampling.sampler as module
 
 KINDS = {"independent": IndependentSampler, "sobol": SobolSampler, "bluenoise": BlueNoiseSampler}
+some = settings(max_examples=settings.default.max_examples * 2 // 5)
 names = pytest.mark.parametrize("name", sorted(SAMPLERS))
 words = st.integers(0, 2**32 - 1)
 seeds = st.integers(0, 2**64 - 1)
@@ -52,6 +53,7 @@ def grid(sampler: Sampler, pixels: int, samples: int, bounce: int = 1, dimension
 
 
 @names
+@some
 @given(
     seed=seeds,
     addresses=st.lists(st.tuples(words, words), min_size=1, max_size=20),
@@ -120,6 +122,7 @@ def test_hash_is_splitmix64():
 
 
 @names
+@some
 @given(seed=seeds, bit=st.integers(0, 63))
 def test_every_bit_of_the_seed_counts(name, seed, bit):
     a = one_pixel(make_sampler(name, seed, 1 << 16), 3, 16)
@@ -128,6 +131,7 @@ def test_every_bit_of_the_seed_counts(name, seed, bit):
 
 
 @names
+@some
 @given(pixel=words, bounce=bounces, dim=dimensions, bit=st.integers(0, 31))
 def test_every_part_of_the_address_counts(name, pixel, bounce, dim, bit):
     sampler = make_sampler(name, 1, 1 << 16)
