@@ -23,6 +23,10 @@ ALL = ("naive", "direct_simple", "direct_mis", "full")
 SAMPLING_LIGHTS = ("direct_simple", "direct_mis", "full")  # the naive one cannot find a point
 DIRECT = ("direct_simple", "direct_mis")
 INDIRECT = ("naive", "full")
+# lights that are met by rays, and lights that are sampled: the others do the same in another order
+MET_AND_SAMPLED = [
+    each if each in ("naive", "direct_mis") else pytest.param(each, marks=pytest.mark.slow) for each in ALL
+]
 
 
 @dataclass(frozen=True)

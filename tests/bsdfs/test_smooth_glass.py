@@ -79,6 +79,7 @@ def test_normal_mapped_glass_loses_no_light():
     assert mean.value == pytest.approx(1, abs=5e-3)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("roughness", [0.4, 0.0])
 @pytest.mark.parametrize("kind", [wf.Dielectric, wf.ThinDielectric])
 @pytest.mark.first(1)

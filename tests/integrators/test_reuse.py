@@ -183,8 +183,8 @@ SCENES = [matte_corner, smooth, veiled, blended, divided, balcony, brushed]
 def test_sharing_keeps_the_mean(build, spp, error, close_tiles):
     """Pure colors, smooth shading, alpha, textures, mixed lobes, media and instances."""
     options = {"max_bounces": 5}
-    plain = repeat(build(), spp, **options)
-    shared = repeat(build(), spp, reuse=True, first_seed=100, **options)
+    plain = repeat(build(), spp, 12, **options)
+    shared = repeat(build(), spp, 12, reuse=True, first_seed=100, **options)
     assert_same_images(plain, shared, error)
 
 
@@ -222,8 +222,8 @@ def lacquered() -> wf.Scene:
 )
 def test_glossy_points_keep_the_mean(spp: int, error: float) -> None:
     """Each pixel sees their BSDF from elsewhere, and weighs light samples by its own density."""
-    plain = repeat(lacquered(), spp, 8, max_bounces=3)
-    shared = repeat(lacquered(), spp, 8, reuse=True, first_seed=100, max_bounces=3)
+    plain = repeat(lacquered(), spp, 12, max_bounces=3)
+    shared = repeat(lacquered(), spp, 12, reuse=True, first_seed=100, max_bounces=3)
     assert_same_images(plain[:, :24, :24], shared[:, :24, :24], error)
 
 
@@ -243,7 +243,7 @@ def test_no_light_is_lost_or_won(close_tiles: None) -> None:
     """In a closed white room of radiance 1 each sample is 1, whichever pixels it comes from."""
     inside = scenes.box((-1, -1, -1), (1, 1, 1), wf.Diffuse(0.5), emission=0.5, inward=True)
     scene = wf.Scene([inside], camera=wf.Camera.look_at((0, 0, 0), (1, 0.3, 0.2), fov=70, size=(16, 16)))
-    runs = repeat(scene, 4, 8, max_bounces=40, reuse=True)
+    runs = repeat(scene, 4, 12, max_bounces=40, reuse=True)
     assert_mean(Mean.of(runs.mean((1, 2, 3))), 1.0, 0.003)
 
 
@@ -443,7 +443,7 @@ def test_groups_keep_their_means(spp: int, error: float, close_tiles: None) -> N
     runs: list[list[wf.Image]] = [
         [
             render(grouped(), spp, seed=first + seed, reuse=reuse, max_bounces=4, aovs="light_groups")
-            for seed in range(10)
+            for seed in range(12)
         ]
         for first, reuse in ((0, False), (100, True))
     ]
@@ -580,7 +580,7 @@ def caustic(size: int) -> wf.Scene:
 @pytest.mark.parametrize(
     ("runs", "options"),
     [
-        pytest.param(10, {"reuse": True, "sampler": "independent"}, id="shared"),
+        pytest.param(16, {"reuse": True, "sampler": "independent"}, id="shared", marks=pytest.mark.slow),
         pytest.param(16, {"sampler": "independent"}, id="plain", marks=pytest.mark.slow),
         pytest.param(10, {"caustics": True}, id="caustic"),
         pytest.param(

@@ -19,7 +19,7 @@ from inside import (
     make_accelerator,
     textured_emission,
 )
-from scenes import ALBEDO, ALL, BLACK, EYE, HERE, floor, polygon_irradiance, probe
+from scenes import ALBEDO, ALL, BLACK, EYE, HERE, MET_AND_SAMPLED, floor, polygon_irradiance, probe
 from significance import SIDE, assert_mean, assert_same_images, measure, render, repeat
 
 import wavefront as wf
@@ -420,7 +420,7 @@ def test_instances_shine_by_the_material_they_have() -> None:
 TOP, LEFT = texture([[1.0], [0.0]]), texture([[1.0, 0.0]])  # halves of a sphere by latitude and longitude
 
 
-@pytest.mark.parametrize("integrator", ALL)
+@pytest.mark.parametrize("integrator", MET_AND_SAMPLED)
 @pytest.mark.parametrize(("turned", "share"), [(TOP, 0.0), (texture([[0.0], [1.0]]), 1.0), (LEFT, 0.5)])
 def test_a_sphere_shines_by_a_texture(turned: wf.Texture, share: float, integrator: str) -> None:
     """From right below, E = π·L·(r/d)² of the lower half, none of the upper, and half of one beside."""

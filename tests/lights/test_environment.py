@@ -15,7 +15,7 @@ from inside import (
     write_image,
 )
 from near import assert_near
-from scenes import ALBEDO, BLACK, EYE, HERE, floor, panel, probe
+from scenes import ALBEDO, BLACK, EYE, HERE, MET_AND_SAMPLED, floor, panel, probe
 from significance import SIDE, Mean, assert_mean, assert_same_images, measure, render, repeat
 
 import wavefront as wf
@@ -157,7 +157,7 @@ def test_a_rendered_panorama_is_the_environment() -> None:
 # --- Exact irradiances -----------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("integrator", ["naive", *SAMPLING])
+@pytest.mark.parametrize("integrator", MET_AND_SAMPLED)
 @pytest.mark.parametrize("transform", [None, turn(2.0)])
 def test_cosine_map(integrator: str, transform) -> None:
     """Case 5 of the reference values: E = 2π/3, to the resolution of the map."""

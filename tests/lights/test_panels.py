@@ -161,6 +161,7 @@ def room() -> wf.Scene:
     return wf.Scene([*scenes.four_materials(), wall, panel, lone, textured, lamp], camera=camera)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "options",
     [{}, {"branches": 3}, {"guide": True}, {"reuse": True}],

@@ -78,6 +78,7 @@ def test_sharing_changes_no_mean(kind: str, settings: dict[str, Any]) -> None:
     assert_mean(Mean.of(1 + (shared - plain) / plain.mean()), 1, 0.02)
 
 
+@pytest.mark.slow
 def test_sharing_leaves_less_than_a_fifth_of_the_variance() -> None:
     pairs = [[of_points(seed, reuse) for seed in (0, 1)] for reuse in (False, True)]
     plain, shared = (np.median(np.square(one - other)) for one, other in pairs)
