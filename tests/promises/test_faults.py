@@ -267,15 +267,15 @@ def test_dropped_samples_leave_the_bits_to_no_division(cut: dict[str, Any], tmp_
         "progress": False,
         "accel": "numpy",
     }
-    whole = wf.render(small_room(), 28, **options)
+    whole = wf.render(small_room(), 64, **options)
     assert whole.metadata["bad_samples"] == 3
-    assert (whole.counts == 27).sum() == 3
+    assert (whole.counts == 63).sum() == 3
     path = tmp_path / "render.wfck"
-    wf.render(small_room(), 14, checkpoint=path, **options, **cut)
-    parts = [wf.render(small_room(), samples=range(*each), **options) for each in ((0, 10), (10, 28))]
+    wf.render(small_room(), 32, checkpoint=path, **options, **cut)
+    parts = [wf.render(small_room(), samples=range(*each), **options) for each in ((0, 20), (20, 64))]
     others = [
-        wf.render(small_room(), 28, **options, **cut),
-        wf.render(small_room(), 28, checkpoint=path, **options),
+        wf.render(small_room(), 64, **options, **cut),
+        wf.render(small_room(), 64, checkpoint=path, **options),
         wf.Image.load(path),
         parts[0].merge(parts[1]),
         parts[1].merge(parts[0]),
