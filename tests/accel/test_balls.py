@@ -103,3 +103,14 @@ def test_many_primitives_have_no_balls() -> None:
     assert bounding_balls(several[:1]) is not None
     assert bounding_balls(several[1:]) is None
     assert bounding_balls(several) is None
+
+
+@pytest.mark.parametrize("offset", [0, 300])
+def test_rays_to_every_corner_come_near_the_ball_of_triangles(offset: float) -> None:
+    triangles = (np.random.default_rng(4).normal(size=(40, 3, 3)) + offset).astype(f4)
+    ball = BoundingBalls.around(triangles)
+    corners = triangles.reshape(-1, 3).T
+    origin, _ = random_rays(corners.shape[1], 5, 50)
+    assert ball.near(origin, corners - origin, nothing(0)) == ALL
+    elsewhere = np.random.default_rng(6).normal(size=corners.shape).astype(f4)
+    assert np.size(ball.near(origin, elsewhere, nothing(0))) < 20
