@@ -143,6 +143,7 @@ def test_every_light_is_here() -> None:
         "PatchedEnvironment",
         "OctahedralEnvironment",  # in tests/lights/test_octahedral.py
         *("MovingLights", "DeformingLights"),  # in tests/motion/test_moving_lights.py
+        "TurningLight",  # in tests/motion/test_turning_skies.py
         "GlowLights",  # points in a volume, in tests/lights/test_glow.py
         *("DirectionalLights", "PointLightRecord", "SpotLights", "PicturedLights", "IESLights"),
     }

@@ -53,7 +53,7 @@ class Placing(Checked):
             instance.motion = motion
 
 
-def _check_mesh(name: str, mesh: Any) -> None:
+def _check_mesh(name: str | None, mesh: Any) -> None:
     """Raise a SceneError if what is to be placed is not a mesh; it says how to get one."""
     if isinstance(mesh, Mesh):
         return
@@ -64,7 +64,7 @@ def _check_mesh(name: str, mesh: Any) -> None:
         hint = "; write wf.load_mesh(path)"
     elif hasattr(mesh, "vertices"):
         hint = "; write wf.from_trimesh(mesh).shapes[0]"
-    raise SceneError(f"{name}: mesh must be a wf.Mesh, got {in_brief(mesh)}{hint}")
+    raise SceneError(f"{name or 'instance'}: mesh must be a wf.Mesh, got {in_brief(mesh)}{hint}")
 
 
 class Instance(Shape):
@@ -110,7 +110,7 @@ class Instance(Shape):
         material: MaterialLike | None = None,
         name: str | None = None,
     ) -> None:
-        _check_mesh(name or "instance", mesh)
+        _check_mesh(name, mesh)
         self.name = mesh.name if name is None else name
         self.mesh = mesh
         self.transform = transform
@@ -141,7 +141,7 @@ class Instance(Shape):
         SceneError
             As for `Instance`. The message names the first invalid transform.
         """
-        _check_mesh(name or "instance", mesh)
+        _check_mesh(name, mesh)
         label = mesh.name if name is None else name
         motions = motions_of(transforms)
         starts: Any = transforms if motions is None else Together(motions).at_starts()
