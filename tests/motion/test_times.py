@@ -148,7 +148,7 @@ def test_groups_of_lights_that_move_are_told_apart() -> None:
     for group in ("still", "moved", "deformed", "ball", "point"):
         found, due = (image.layers[f"light_groups.{group}"].astype(float) for image in (blurred, held))
         assert due.mean() > 0.005
-        assert abs(found.mean() - due.mean()) < 0.02 * due.mean(), group
+        assert abs(found.mean() - due.mean()) < 0.06 * due.mean(), group  # three standard errors
 
 
 def test_a_crop_is_a_part_of_the_blurred_picture() -> None:
