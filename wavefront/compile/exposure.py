@@ -19,6 +19,7 @@ from ..motion.quaternions import rotation_of
 from ..motion.shutter import Shutter
 from ..motion.steps import Matrices
 from ..scene import Scene
+from ..scene.scene import boxes_over_time
 from ..shapes import Instance, Mesh, Shape, Sphere, Spheres
 from ..shapes.instance import of_class, unshaded
 from ..shapes.transform import is_even, points_by
@@ -52,7 +53,7 @@ def exposed_scene(scene: Scene, shutter: Shutter | None) -> Exposed:
     still, moving = copy(scene), [shape for shape in scene.shapes if _moves(shape, shutter)]
     times = np.linspace(shutter.begin, shutter.end, TIMES).tolist()
     plain = [unshaded(shape) for shape in moving]
-    boxes = [Scene([shape.at(time) for shape in plain]).bounds for time in times if plain]
+    boxes = boxes_over_time(plain, times) if plain else []
     keys = np.concatenate([_inside(each.keys, shutter) for each in (*moving, *scene.lights)])
     exposed, forms = Exposed(still, shutter, boxes=tuple(boxes), keys=np.unique(keys)), _Forms(shutter)
     shapes = [shape.at(shutter.middle) for shape in scene.shapes]

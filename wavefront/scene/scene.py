@@ -298,13 +298,20 @@ class Scene(Answers):
         time, moving = number("time", time), self._moving
         if not (moving.any or self.file_moments is not None or any(seen.moves for seen in self._seen)):
             return self
+        moment = self._moment(time)
+        if moment is None:
+            raise SceneError(f"at {time:g} s the scene has no shapes: all of them have no size")
+        return moment
+
+    def _moment(self, time: float) -> Scene | None:
+        """Return the scene at a time, s; None where no shape has a size."""
         if self.file_moments is not None:
             shapes, lights, camera = self.file_moments.at(self, time)
         else:
-            shapes, lights = moving.at(time), [light.at(time) for light in self.lights]
+            shapes, lights = self._moving.at(time), [light.at(time) for light in self.lights]
             camera = None if self.camera is None else self.camera.at(time)
         if not shapes:
-            raise SceneError(f"at {time:g} s the scene has no shapes: all of them have no size")
+            return None
         moment = copy(self)
         moment._shapes, moment._lights = _checked(Shapes, shapes), _checked(Lights, lights)
         moment._camera = camera
@@ -341,7 +348,8 @@ class Scene(Answers):
             return [self]
         plain = copy(source)
         plain._shapes, plain._moments = Shapes([unshaded(shape) for shape in source.shapes]), None
-        return (plain.at(time) for time in np.linspace(*source._span(), MOMENTS))  # not all at once
+        moments = (plain._moment(time) for time in np.linspace(*source._span(), MOMENTS))  # not all at once
+        return (moment for moment in moments if moment is not None)
 
     @property
     def reach(self) -> Doubles:
@@ -477,6 +485,12 @@ class Scene(Answers):
         return np.concatenate([centers for centers, _ in hulls]), np.concatenate(
             [radii for _, radii in hulls]
         )
+
+
+def boxes_over_time(shapes: Sequence[Shape], times: Iterable[float]) -> list[Doubles]:
+    """Return the box (2, 3) around shapes that move, at each time at which one of them has a size."""
+    moments = Moments(shapes)
+    return [_around(_boxes_of(there)) for there in map(moments.at, times) if there]
 
 
 def _boxes_of(shapes: Sequence[Shape]) -> Doubles:
