@@ -73,6 +73,10 @@ MOVING = {
         ),
         SLIDE.at,
     ),
+    "moving in what moves": (
+        wf.Group([wf.Group([wf.Box((0, 0, 0), 1)]).placed(TURN)]).placed(SLIDE),
+        lambda time: SLIDE.at(time) @ TURN.at(time),
+    ),
     "still": (wf.Box((0, 0, 0), 1), lambda time: np.eye(4)),
 }
 K = [[40, 1, 24], [0, 42, 18], [0, 0, 1]]
