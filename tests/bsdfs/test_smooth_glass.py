@@ -55,6 +55,7 @@ CLEAR = {
 
 @pytest.mark.parametrize("name", CLEAR)
 @pytest.mark.parametrize("integrator", [pytest.param("naive", marks=pytest.mark.slow), "full"])
+@pytest.mark.first(2)
 def test_every_clear_material_keeps_its_light(name, integrator):
     mean = furnace(ball(2, CLEAR[name]), spp=32, integrator=integrator)
     assert mean.error < 2e-4

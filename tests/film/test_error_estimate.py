@@ -118,7 +118,7 @@ def lit() -> wf.Scene:
     ("sampler", "spp", "low", "high"),
     [
         ("independent", 16, 0.93, 1.07),
-        ("sobol", 64, 0.97, 1.4),
+        pytest.param("sobol", 64, 0.97, 1.4, marks=pytest.mark.slow),
         pytest.param("bluenoise", 16, 0.97, 1.4, marks=pytest.mark.slow),
         pytest.param("independent", 256, 0.93, 1.07, marks=pytest.mark.slow),
         pytest.param("sobol", 256, 0.95, 1.4, marks=pytest.mark.slow),

@@ -511,6 +511,7 @@ def test_the_error_of_a_mean_of_few_samples_is_not_overestimated() -> None:
 
 
 @pytest.mark.parametrize(("spp", "reuse"), [(16, True), (4, False)])
+@pytest.mark.first(1)
 def test_pictures_of_different_kinds_are_compared(spp: int, reuse: bool) -> None:
     """With four times the samples, or without shared paths."""
     scene = below_the_lamp(56)

@@ -421,7 +421,7 @@ def within_glass() -> wf.Scene:
     [cornell_box((28, 28)), within_glass(), everything((28, 28))],
     ids=["box", "within glass", "everything"],
 )
-@pytest.mark.first(2)
+@pytest.mark.first(1)
 def test_twins_share_first_surfaces_alone(scene: wf.Scene) -> None:
     """The first ones are the paths of a picture, and the others have its mean; noise of edges they share."""
     assert scene.camera is not None

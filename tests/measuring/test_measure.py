@@ -221,6 +221,7 @@ def coverage(points: int, seeds: int, **settings: Any) -> float:
     return float(np.mean([each[lit] for each in inside]))
 
 
+@pytest.mark.slow
 def test_intervals_hold_what_they_say() -> None:
     """And a little more: they allow for what few samples may have missed."""
     assert 0.95 <= coverage(60, 8, spp=32) <= 0.995

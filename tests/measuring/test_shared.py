@@ -70,7 +70,7 @@ def test_a_furnace_is_as_bright_with_shared_paths(kind: str, factor: float) -> N
     "settings", [{}, {"branches": 2}, pytest.param({"guide": True}, marks=pytest.mark.slow)], ids=str
 )
 @pytest.mark.parametrize("kind", ["irradiance", "fluence"])
-@pytest.mark.first(3)
+@pytest.mark.first(1)
 def test_sharing_changes_no_mean(kind: str, settings: dict[str, Any]) -> None:
     scene = scenes.cornell_box()
     scene.shapes[0].material = wf.Diffuse((0.9, 0.5, 0.1))

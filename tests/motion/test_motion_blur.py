@@ -105,6 +105,7 @@ SCENES = scenes()
 
 
 @pytest.mark.parametrize("name", ["instance", "deforming", "camera", "lamp"])
+@pytest.mark.first(2)
 def test_blurred_picture_is_the_mean_of_stills(name):
     assert_mean_of_stills(SCENES[name], runs=4, strata=3, spp=6)
 

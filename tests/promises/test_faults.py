@@ -257,7 +257,7 @@ def test_a_normal_that_is_not_finite_is_dropped() -> None:
 @pytest.mark.parametrize(
     "cut", [{"wave_size": 700}, {"workers": 3, "executor": "threads", "wave_size": 1000}]
 )
-@pytest.mark.first(1)
+@pytest.mark.slow
 def test_dropped_samples_leave_the_bits_to_no_division(cut: dict[str, Any], tmp_path: Path) -> None:
     """Neither waves and workers, nor merged pictures, nor a render that is resumed."""
     options: dict[str, Any] = {

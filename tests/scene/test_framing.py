@@ -191,7 +191,7 @@ def test_a_session_frames_again() -> None:
 
 @pytest.mark.parametrize("up", ["y", "z"])
 @pytest.mark.parametrize("name", ["beam", "tower", "balls", "placed"])
-@pytest.mark.first(3)
+@pytest.mark.first(1)
 def test_a_turntable_cuts_nothing(name: str, up: str) -> None:
     scene = wf.Scene(shapes()[name])
     found = [covered(scene, each) for each in wf.turntable(scene, 12, size=(96, 72), up=up)]

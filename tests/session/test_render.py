@@ -39,6 +39,7 @@ def whole(integrator: str, sampler: str) -> bytes:
         *(("full", sampler) for sampler in SAMPLERS if sampler != "sobol"),
     ],
 )
+@pytest.mark.first(4)
 def test_waves_and_workers_change_no_bit(integrator: str, sampler: str) -> None:
     """Results are added in the order of the work, not of its completion."""
     cuts = [{"wave_size": 17}, {"wave_size": 64, "workers": 2}, {"wave_size": 50, "workers": 8}]

@@ -92,7 +92,7 @@ def _without_flip(missing) -> None:
 
 @pytest.mark.parametrize("draw", [flashes, fireflies, gaussian, heavy, edges])
 @pytest.mark.parametrize("spp", [(2, 2), (16, 16), pytest.param((16, 2048), marks=pytest.mark.slow)], ids=str)
-@pytest.mark.first(7)
+@pytest.mark.first(4)
 def test_false_alarms(draw, spp) -> None:
     """Are at most as frequent as the p-values say, for any distribution of samples."""
     rng, (runs, size) = (

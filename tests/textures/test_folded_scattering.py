@@ -157,7 +157,7 @@ def scene_and_pictures(bsdf, shines):
 
 @pytest.mark.parametrize("options", WAYS, ids=str)
 @pytest.mark.parametrize("bsdf", [wf.Diffuse(1.0), wf.Conductor.named("silver", roughness=0.5)])
-@pytest.mark.first(4)
+@pytest.mark.first(2)
 def test_every_way_finds_the_same_light(bsdf, options):
     scene, bounces, expected = scene_and_pictures(bsdf, "integrator" in options)
     spp = 256 if "integrator" in options else 64
