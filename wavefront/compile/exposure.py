@@ -47,25 +47,24 @@ def exposed_scene(scene: Scene, shutter: Shutter | None) -> Exposed:
     if shutter is None:
         return Exposed(scene, changed=scene.changed)
     scene = _sampled(scene, shutter)
-    if not any(_moves(element, shutter) for element in (*scene.shapes, *scene.lights)):
+    moving = {number: shape for number, shape in enumerate(scene.shapes) if _moves(shape, shutter)}
+    lights = {number: light for number, light in enumerate(scene.lights) if _moves(light, shutter)}
+    if not moving and not lights:
         moment = scene.at(shutter.middle)
         return Exposed(moment, changed=moment.changed)
-    still, moving = copy(scene), [shape for shape in scene.shapes if _moves(shape, shutter)]
-    times = np.linspace(shutter.begin, shutter.end, TIMES).tolist()
-    plain = [unshaded(shape) for shape in moving]
+    still, times = copy(scene), np.linspace(shutter.begin, shutter.end, TIMES).tolist()
+    plain = [unshaded(shape) for shape in moving.values()]
     boxes = boxes_over_time(plain, times) if plain else []
-    keys = np.concatenate([_inside(each.keys, shutter) for each in (*moving, *scene.lights)])
+    keys = np.concatenate([_inside(each.keys, shutter) for each in (*moving.values(), *scene.lights)])
     exposed, forms = Exposed(still, shutter, boxes=tuple(boxes), keys=np.unique(keys)), _Forms(shutter)
     shapes = [shape.at(shutter.middle) for shape in scene.shapes]
-    for number, shape in enumerate(scene.shapes):
-        if _moves(shape, shutter):
-            shapes[number], exposed.movers[number] = forms.mover(shape, shapes[number])
+    for number, shape in moving.items():
+        shapes[number], exposed.movers[number] = forms.mover(shape, shapes[number])
     still.shapes = shapes
     exposed.changed = np.array(list(map(is_not, shapes, scene.shapes)))
     still.lights = [light.at(shutter.middle) for light in scene.lights]
-    for number, light in enumerate(scene.lights):
-        if _moves(light, shutter):
-            exposed.lights[number] = _rigid(light, shutter)
+    for number, light in lights.items():
+        exposed.lights[number] = _rigid(light, shutter)
     return exposed
 
 

@@ -48,10 +48,9 @@ class Motions:
     first_of: Ints  # (BINS + 1,) the step at the beginning of each bin
     # (12, m * steps) for each step of each motion: the (3, 4) matrix at its beginning, row by row
     to_local: Doubles
-    slope: list[
-        Doubles | None
-    ]  # 12 × (m * steps,) its change by a part of the step; None where there is none
-    bend: list[Doubles | None]  # 12 × (m * steps,) the same by the square of that part
+    # 12 × (m * steps,) its change by a part of the step, and by the square of that part; None where it is 0
+    slope: list[Doubles | None]
+    bend: list[Doubles | None]
     error: Doubles  # (m,) of places that steps leave out, relative to the size of what moves; jumps aside
 
     @classmethod
@@ -94,7 +93,7 @@ class Motions:
     ) -> Self:
         """Return the table: of lines where these do not need many steps, or else of parabolas."""
         room = max(1, min(MOST_STEPS, MOST_MATRICES // len(motions)))
-        between = (_bends(keys, begin, end, 4 * room) - begin) / (end - begin)
+        between = (_tested_times(keys, begin, end, 4 * room) - begin) / (end - begin)
         whole = _steps_at(motions, begin, end, np.array([0.0, 1.0]), np.append(BETWEEN, between))
         size = _sizes(whole.placed, reach)
         scale = reach, size
@@ -254,7 +253,7 @@ def _steps_at(
     return _Steps(start, parts, placed.reshape(shape), to_local.reshape(shape), np.zeros(shape[:2]))
 
 
-def _bends(keys: Doubles, begin: float, end: float, most: int) -> Doubles:
+def _tested_times(keys: Doubles, begin: float, end: float, most: int) -> Doubles:
     """Return keys between two times, the middles between them, and uneven times; at most so many of each."""
     inside = np.unique(keys[(keys > begin) & (keys < end)])
     inside = inside[:: max(-(-inside.size // most), 1)]

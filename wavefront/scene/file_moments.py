@@ -49,9 +49,8 @@ class FileMoments:
         elements: list[Any] = [*self._shapes, *self._lights]
         self._known = {key: element for element in elements if (key := _made_of(element)) is not None}
         self._samples: list[Scene] = []
-        self._read_last: dict[
-            float, OfFile
-        ] = {}  # by time: a blurred picture asks twice for each of its times
+        # by time: a blurred picture asks twice for each of its times
+        self._read_last: dict[float, OfFile] = {}
 
     def __getstate__(self) -> dict[str, Any]:
         """Leave out what can be read again."""

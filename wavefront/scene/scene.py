@@ -275,7 +275,7 @@ class Scene(Answers):
         """Return the scene at a time, in which nothing moves.
 
         Still objects are shared with this scene: meshes, textures, and the trees of the last render. The
-        first call looks for motions; further ones take 0.1 to 0.3 s for 100 000 moving instances.
+        first call looks for motions; further ones take 0.1 to 0.2 s for 100 000 moving instances.
 
         Parameters
         ----------
